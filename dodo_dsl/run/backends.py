@@ -14,10 +14,10 @@ from dodo_dsl.run.process import host_isolation
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.processes import Processes
 from dodo_dsl.run.process.slot import Slot
-from dodo_dsl.run.protocol import Backend, BackendError, Say
+from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.run.rigs.permission import refuse_unattended
 from dodo_dsl.run.rigs.session import RigSession, attended
-from dodo_dsl.run.sides import Side, Sides, WatchedServices
+from dodo_dsl.run.sides import Backend, Side, WatchedServices
 from dodo_dsl.run.work_folder import meeting_place
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ class CombinedBackends:
                 channel = ""  # of kept containers nobody holds the folder: they meet in their volume
             slot = await stack.enter_async_context(self._slot(plan, isolation, channel, say, keep))
             sides: list[Side] = [stack.enter_context(kind.side(watched, slot, isolation, say)) for kind in self._kinds]
-            yield Sides(self.name, slot.cid, isolation == "host", watched, sides[0], sides[-1])
+            yield Backend(self.name, slot.cid, isolation == "host", watched, sides[0], sides[-1])
 
     @contextlib.asynccontextmanager
     async def _slot(self, plan: Plan, isolation: str, channel: str, say: Say, keep: bool) -> AsyncIterator[Slot]:

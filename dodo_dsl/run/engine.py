@@ -12,7 +12,6 @@ from dodo_dsl.run import listeners, start_order
 from dodo_dsl.run.machine_load.meter import Meter
 from dodo_dsl.run.outcomes import deaf
 from dodo_dsl.run.protocol import (
-    Backend,
     BackendError,
     Event,
     Exited,
@@ -26,6 +25,7 @@ from dodo_dsl.run.protocol import (
     VerdictEvent,
 )
 from dodo_dsl.run.run_state import Ended, RunState, Standing, standing
+from dodo_dsl.run.sides import Backend
 
 READY_PATIENCE_S = READY_S
 LAST_TIME_PATIENCE_S = 2.0
@@ -175,7 +175,9 @@ class Engine:
         begin = self._now()
         patience = dict.fromkeys(waits, READY_PATIENCE_S)
         patience |= {s.name: READY_PATIENCE_S + s.setup_s for s in self.plan.services if s.name in waits}
-        patience |= {s.name: self._longest_s(s.name) for s in self.plan.application.services if s.after}
+        services = self.plan.application.services
+        longest_s = start_order.LONGEST_S * (len(services) + 1) + READY_PATIENCE_S  # each may wait for the one before
+        patience |= {s.name: longest_s for s in services if s.after}
         while left := waits - self.state.ready:
             late = min(left, key=lambda name: (patience[name], name))
             event = await self._next(begin + patience[late])
@@ -183,11 +185,6 @@ class Engine:
                 self.state.end("error", f"service '{late}' was not ready within {patience[late]:g} s", late)
             else:
                 self.state.take(event)
-
-    def _longest_s(self, name: str) -> float:
-        """For one that waits for others, and then for its own health: beyond what the backend gives it."""
-        services = self.plan.application.services
-        return start_order.longest_s(services, name) + start_order.LONGEST_S + READY_PATIENCE_S
 
     async def _next(self, deadline: float) -> Event | None:
         try:

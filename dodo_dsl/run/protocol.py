@@ -1,13 +1,12 @@
-"""What a backend is, and the events that it reports to the engine while a test runs."""
+"""The events that a backend reports to the engine while a test runs."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Literal
 
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 from dodo_dsl.outcome import Amount, Check, Evidence, Response, Verdict
-from dodo_dsl.run.machine_load.service_use import Snapshot
 
 MOST_TEXT = 2000
 """Characters that a report can show."""
@@ -213,62 +212,6 @@ class Unmatched:
 
 
 Event = Message | VerdictEvent | Malformed | Exited | Unstartable | Lost | GraphFinding
-
-
-class Running(Protocol):
-    """What runs services of a test. It reports by events, but ``BackendError`` where it says so."""
-
-    async def start(self, layer: str) -> dict[str, bool]:
-        """Starts the services of a layer; returns their names, and whether each will report that it is ready."""
-        ...
-
-    async def listeners(self) -> Collection[str] | None:
-        """The services of the application that listen on an OpenDLV bus already; None if that cannot be seen."""
-        ...
-
-    async def use(self) -> Snapshot | None:
-        """What the services used so far; None if that cannot be measured."""
-        ...
-
-    async def application(self) -> Collection[int] | None:
-        """Processes of this machine of which the application's are, or descend; None if they are not known."""
-        ...
-
-    async def close(self, keep: bool) -> list[str]:
-        """Ends everything and cleans up; with ``keep``, leaves it and returns sentences on how to look inside."""
-        ...
-
-
-class Backend(Running, Protocol):
-    """Where all of a test's services run."""
-
-    name: str
-    cid: int
-    is_on_host: bool
-    """Whether the application has the machine's own ``/tmp``, shared memory and IPC."""
-
-    async def open(self) -> None:
-        """Raises BackendError."""
-        ...
-
-    async def next_event(self) -> Event: ...
-
-    @property
-    def by_answers(self) -> bool:
-        """Whether the application keeps the machine's time in lockstep."""
-        ...
-
-    async def begin(self) -> None:
-        """Announces on the test's bus that everything is ready; may be repeated."""
-        ...
-
-    def tail(self, service: str) -> list[str]:
-        """The last lines that a service wrote."""
-        ...
-
-    def unmatched(self) -> tuple[Unmatched, ...]:
-        """Of each service of the application whose lines are messages, those that matched nothing."""
-        ...
 
 
 class BackendError(Exception):

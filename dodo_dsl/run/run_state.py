@@ -27,7 +27,6 @@ from dodo_dsl.run.outcomes import (
     windowless,
 )
 from dodo_dsl.run.protocol import (
-    Backend,
     Event,
     Exited,
     Flooded,
@@ -50,6 +49,7 @@ from dodo_dsl.run.protocol import (
     Unstartable,
     VerdictEvent,
 )
+from dodo_dsl.run.sides import Backend
 
 MOST_NOTES = 100
 _MOST_OF_GRAPH = 3

@@ -11,10 +11,12 @@ from typing import Literal, Protocol, Self
 
 from dodo_dsl.application import secret_variables
 from dodo_dsl.outcome import NotRun, Outcome
+from dodo_dsl.plan.added_services import PICTURES_FILE, RECORDING
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.attempts import Attempts, is_undecided
 from dodo_dsl.run.backends import Backends, Job
-from dodo_dsl.run.outcomes import error_outcome, error_reason
+from dodo_dsl.run.engine import Engine
+from dodo_dsl.run.outcomes import describe, error_outcome, error_reason, system_error
+from dodo_dsl.run.rigs.pool import opened
 from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.schedule import CorePool, Schedule
 
@@ -78,9 +80,10 @@ class Runner:
         self._cores = CorePool(schedule.capacity)
         self._waiting: list[Job] = []
         self._began: dict[str, tuple[Job, float]] = {}
-        self._attempts = Attempts(
-            backends, progress.phase, policy.retries, keep, lambda: self.interrupted, progress.standing
-        )
+        self.kept: list[str] = []
+        """Sentences on the tests that were left running."""
+        self._made: dict[str, int] = {}
+        """How many attempts at each test there were."""
         self._stop = False
         self._finished: Finished = _nothing
 
@@ -89,11 +92,6 @@ class Runner:
         reason = "the run was interrupted" if self.interrupted else "a test before did not pass"
         plans = [job.plan for job in self.skipped]
         return [NotRun(plan.name, plan.slug, plan.spec, plan.level, reason) for plan in plans]
-
-    @property
-    def kept(self) -> list[str]:
-        """Sentences on the tests that were left running."""
-        return self._attempts.kept
 
     async def run(self, jobs: Sequence[Job], finished: Finished = _nothing) -> list[Outcome]:
         """The outcomes in the order of the jobs; SIGINT, SIGTERM and SIGHUP end all tests with their teardown.
@@ -125,7 +123,7 @@ class Runner:
     async def _one(self, job: Job) -> Outcome | None:
         """A test's outcome, or None when no further test was to begin."""
 
-        outcome = await self._turn(job, self.schedule.need(job), functools.partial(self._attempts.outcome, job))
+        outcome = await self._turn(job, self.schedule.need(job), functools.partial(self._outcome, job))
         if outcome is None:
             self.skipped.append(job)
             return None
@@ -158,12 +156,73 @@ class Runner:
 
     async def _again(self, job: Job, first: Outcome) -> Outcome:
         """The outcome of a test for which the machine was too busy."""
-        if problem := self._attempts.set_aside(job):
+        if problem := self._set_aside(job):
             return replace(first, notes=(*first.notes, f"not tried again alone, {problem}"))
         self.progress.phase(job.plan.slug, "trying again alone")
-        outcome = await self._attempts.outcome(job, alone=True)
+        outcome = await self._outcome(job, alone=True)
         note = f"tried again alone, because the machine was too busy: {first.reason}"
         return replace(outcome, notes=(*first.notes, note, *outcome.notes))
+
+    async def _outcome(self, job: Job, alone: bool = False) -> Outcome:
+        """That of the last attempt, after errors up to as many as the policy says; earlier ones stay in the report.
+
+        What a busy machine left undecided is tried again when the test is ``alone``, and not at once.
+        """
+        notes: tuple[str, ...] = ()
+        for left in range(self.policy.retries, -1, -1):
+            outcome = await self._attempt(job)
+            is_over = outcome.outcome != "error" or (is_undecided(outcome) and not alone)
+            if is_over or self.interrupted or not left:
+                break
+            notes = (*notes, f"attempt {self._made[job.plan.slug]} ended in error: {outcome.reason}")
+            if problem := self._set_aside(job):
+                notes = (*notes, f"not retried, {problem}")
+                break
+            self.progress.phase(job.plan.slug, f"retrying after error: {outcome.reason}")
+        return replace(outcome, notes=(*notes, *outcome.notes))
+
+    def _set_aside(self, job: Job) -> str:
+        """Moves the report of the last attempt into ``attempts/<number>``; why it cannot be, or an empty text."""
+        target = job.report / "attempts" / str(self._made[job.plan.slug])
+        try:
+            entries = [each for each in job.report.iterdir() if each.name != "attempts"]
+            target.mkdir(parents=True)
+            for entry in entries:
+                entry.rename(target / entry.name)
+        except FileNotFoundError:  # it reported nothing
+            return ""
+        except OSError as error:
+            return f"because its report cannot be moved: {system_error(error)}"
+        return ""
+
+    async def _attempt(self, job: Job) -> Outcome:
+        slug, outcome = job.plan.slug, None
+        self._made[slug] = self._made.get(slug, 0) + 1
+        say, stands = functools.partial(self.progress.phase, slug), functools.partial(self.progress.standing, slug)
+
+        def forget_pictures() -> None:
+            with contextlib.suppress(OSError):
+                (job.report / PICTURES_FILE).unlink(missing_ok=True)
+
+        try:
+            async with opened(job, say, lambda one: self.backends.open(one, say, self.keep)) as (chosen, backend):
+                engine = Engine(chosen.plan, backend, say, stands, forget_pictures)
+                outcome, kept = await engine.run(self.keep)
+                self.kept.extend(kept)
+                if engine.state.finding.cause == "silence" and not self.keep:
+                    why = await asyncio.to_thread(_silent, job)
+                    outcome = replace(outcome, reason="; ".join(filter(None, (outcome.reason, why))))
+                if job.plan.pool:
+                    outcome = replace(outcome, notes=(*outcome.notes, f"ran on rig '{chosen.plan.rig}'"))
+        except Exception as error:  # noqa: BLE001  (whatever it is, it concerns this test alone)
+            if outcome is None:
+                return error_outcome(job.plan, self.backends.name, error_reason(error, job.report))
+            return replace(
+                outcome, notes=(*outcome.notes, f"not all of the test was taken down: {describe(error, job.report)}")
+            )
+        if outcome.outcome == "passed" and not self.keep:
+            forget_pictures()
+        return outcome
 
     def _show_rest(self) -> None:
         if self.interrupted:
@@ -190,3 +249,18 @@ def _signals_call(react: Callable[[], None]) -> Iterator[None]:
 
 def _now() -> float:
     return asyncio.get_running_loop().time()
+
+
+def _silent(job: Job) -> str:
+    """Which program of the application is to blame that it did not answer; empty if that is not known."""
+    from dodo_dsl.opendlv.odvd import OdvdError
+    from dodo_dsl.run.test_recording import silent_consumer
+
+    with contextlib.suppress(OSError, OdvdError):
+        return silent_consumer(job.plan, job.folder, job.report / RECORDING)
+    return ""
+
+
+def is_undecided(outcome: Outcome) -> bool:
+    """Whether the machine was too busy to judge."""
+    return outcome.machine is not None and outcome.machine.undecided

@@ -18,7 +18,7 @@ from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import PrintedLines, Send
-from dodo_dsl.run.protocol import Event, Exited, GraphFinding, Noted, Rested, Running, Unmatched, Unstartable
+from dodo_dsl.run.protocol import Event, Exited, GraphFinding, Noted, Rested, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.service_protocol import Reports
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off, optional
@@ -157,8 +157,8 @@ class WatchedServices:
             output.close()
 
 
-class Side(Running, Protocol):
-    """Processes or containers of one test."""
+class Side(Protocol):
+    """Processes or containers of one test. It reports by events, but raises BackendError where it says so."""
 
     async def open(self, entered: int = 0) -> int:
         """In the network, IPC namespace and ``/tmp`` of a process; returns the one whose the other side shares.
@@ -171,9 +171,32 @@ class Side(Running, Protocol):
         """What sends to DoDo's services, which this side has, and on the bus; raises BackendError."""
         ...
 
+    async def start(self, layer: str) -> dict[str, bool]:
+        """Starts the services of a layer; returns their names, and whether each will report that it is ready."""
+        ...
 
-class Sides:
-    """The backend of one test; ``own`` is DoDo's side, which may be the ``application``'s, too."""
+    async def listeners(self) -> Collection[str] | None:
+        """The services of the application that listen on an OpenDLV bus already; None if that cannot be seen."""
+        ...
+
+    async def use(self) -> Snapshot | None:
+        """What the services used so far; None if that cannot be measured."""
+        ...
+
+    async def application(self) -> Collection[int] | None:
+        """Processes of this machine of which the application's are, or descend; None if they are not known."""
+        ...
+
+    async def close(self, keep: bool) -> list[str]:
+        """Ends everything and cleans up; with ``keep``, leaves it and returns sentences on how to look inside."""
+        ...
+
+
+class Backend:
+    """Where all services of one test run; ``own`` is DoDo's side, which may be the ``application``'s, too.
+
+    On the host the application has the machine's own ``/tmp``, shared memory and IPC.
+    """
 
     def __init__(
         self, name: str, cid: int, is_on_host: bool, watched: WatchedServices, own: Side, application: Side
@@ -203,9 +226,11 @@ class Sides:
 
     @property
     def by_answers(self) -> bool:
+        """Whether the application keeps the machine's time in lockstep."""
         return self._watched.by_answers
 
     async def begin(self) -> None:
+        """Announces on the test's bus that everything is ready; may be repeated."""
         assert self._send is not None, "the application was started"
         self._send(begin_frame(self._watched.plan.seed), hearers(self._watched.plan))
 

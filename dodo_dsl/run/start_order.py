@@ -126,18 +126,3 @@ def optional(services: Iterable[ApplicationService]) -> set[str]:
     services = tuple(services)
     found = [(n, n in s.optional) for s in services for n, condition in s.after.items() if condition != STARTED]
     return {n for n, _ in found} - {n for n, is_optional in found if not is_optional}
-
-
-def longest_s(services: Iterable[ApplicationService], name: str) -> float:
-    """The longest, in s, until a service has started: all may wait as long as they can, one after the other."""
-    after = {s.name: s.after for s in services}
-    waits = [c for each in _chain(after, name) for c in after.get(each, {}).values() if c != STARTED]
-    return LONGEST_S * len(waits)
-
-
-def _chain(after: Mapping[str, Mapping[str, str]], name: str) -> list[str]:
-    """A service, and those for which it waits, directly or through others."""
-    found = [name]
-    for each in found:
-        found += [other for other in after.get(each, {}) if other not in found]
-    return found

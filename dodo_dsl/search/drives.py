@@ -20,10 +20,11 @@ from dodo_dsl.emit.output_folder import write
 from dodo_dsl.outcome import Outcome, failed_checks, worst_margin
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.backends import Backends, Job
-from dodo_dsl.run.protocol import Backend, Say
+from dodo_dsl.run.protocol import Say
 from dodo_dsl.run.rigs.session import RigSession
 from dodo_dsl.run.runner import Policy, Progress, Runner
 from dodo_dsl.run.schedule import Schedule
+from dodo_dsl.run.sides import Backend
 from dodo_dsl.search.space import texts
 from dodo_dsl.search.store import Drive, Store, point_text
 from dodo_dsl.search.study import NotSearchable

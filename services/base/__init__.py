@@ -1,6 +1,6 @@
 """Shared by all services: flags from the manifest, the loop with its injected clock, readiness, verdicts."""
 
-from services.base.clock import Clock, Inbox, RealTimeClock
+from services.base.clock import Clock, RealTimeClock
 from services.base.evaluator import Evaluator, JudgedTime, UnjudgeableError
 from services.base.flags import Flags, FlagsError, Share
 from services.base.judged import Judged, JudgedBoxes, Series
@@ -15,7 +15,6 @@ __all__ = [
     "Flags",
     "FlagsError",
     "Handler",
-    "Inbox",
     "Judged",
     "JudgedBoxes",
     "JudgedTime",

@@ -4,10 +4,13 @@ import logging
 import time
 from collections.abc import Callable, Iterator
 from fractions import Fraction
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.shared_memory import SharedMemory
+
+if TYPE_CHECKING:
+    from services.base.loop import Loop
 
 MICROSECONDS = 1_000_000
 LATEST = MICROSECONDS
@@ -15,32 +18,6 @@ _SLICE = 0.1
 _MAX_DRAINED = 1000
 
 _log = logging.getLogger(__name__)
-
-
-class Inbox(Protocol):
-    """Messages for the service. A clock takes every envelope and passes on those that the service is to handle."""
-
-    def receive(self, timeout: float) -> Envelope | None:
-        """The next envelope within ``timeout`` seconds."""
-        ...
-
-    def handle(self, envelope: Envelope) -> None:
-        """Let the service handle it."""
-        ...
-
-    @property
-    def observes(self) -> bool:
-        """Whether the service observes everything on the bus."""
-        ...
-
-    @property
-    def consumes(self) -> frozenset[int]:
-        """Ids of the messages that the service handles."""
-        ...
-
-    def observe(self, envelope: Envelope) -> None:
-        """It is on the bus, but the service must not act upon it."""
-        ...
 
 
 class Clock:
@@ -60,7 +37,7 @@ class Clock:
         """The time of the test."""
         raise NotImplementedError
 
-    def steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+    def steps(self, period: Fraction | int, inbox: "Loop", stopped: Callable[[], bool]) -> Iterator[int]:
         """The instants at which a service is due, one each ``period`` microseconds; messages come in between.
 
         Ends soon after ``stopped``, which a message or a signal can make true.
@@ -96,7 +73,7 @@ class RealTimeClock(Clock):
     def now(self) -> int:
         return time.monotonic_ns() // 1000 + self._offset
 
-    def steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+    def steps(self, period: Fraction | int, inbox: "Loop", stopped: Callable[[], bool]) -> Iterator[int]:
         start, number = self.now(), 0
         while True:
             due = start + round(number * period)
@@ -116,7 +93,7 @@ class RealTimeClock(Clock):
         if self._has_memory:
             look_until(stopped)
 
-    def _wait(self, due: int, inbox: Inbox, stopped: Callable[[], bool]) -> None:
+    def _wait(self, due: int, inbox: "Loop", stopped: Callable[[], bool]) -> None:
         """Deliver messages until the instant, and then those that are there already."""
         while (left := due - self.now()) > 0 and not stopped():
             _deliver(inbox, min(left / MICROSECONDS, _SLICE))
@@ -140,7 +117,7 @@ def look_until(is_over: Callable[[], bool], pause: float = 0.001, longest: float
         pause = min(1.5 * pause, longest)
 
 
-def _deliver(inbox: Inbox, timeout: float) -> bool:
+def _deliver(inbox: "Loop", timeout: float) -> bool:
     envelope = inbox.receive(timeout)
     if envelope is not None:
         inbox.handle(envelope)

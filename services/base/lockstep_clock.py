@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from fractions import Fraction
 from functools import partial
 from itertools import groupby, islice
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from dodo_dsl.opendlv.channel import About, Done, Show, Step
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
@@ -26,8 +26,11 @@ from dodo_dsl.opendlv.posix_memory import PosixSegment
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import LOCK_PATIENCE, SharedMemory
 from dodo_dsl.opendlv.sysv_memory import Segment
-from services.base.clock import Clock, Inbox, look_until
+from services.base.clock import Clock, look_until
 from services.base.clock_link import ClockClient
+
+if TYPE_CHECKING:
+    from services.base.loop import Loop
 
 _POLL_S = 0.0002
 _LONGEST_POLL_S = 0.002
@@ -131,7 +134,7 @@ class Observer:
         """An envelope that was on the bus."""
         self._collected.append(envelope)
 
-    def deliver(self, inbox: Inbox, until: int, relayed: Sequence[Envelope]) -> None:
+    def deliver(self, inbox: "Loop", until: int, relayed: Sequence[Envelope]) -> None:
         """Deliver all of a step (its end ``until`` in us), after the application's answer to the one before.
 
         The answer to this one, and what belongs to later ones, waits: whether it is there already is chance.
@@ -147,7 +150,7 @@ class Observer:
         for envelope in self._marked(until, relayed) if self._marked else own:
             inbox.observe(envelope)
 
-    def flush(self, inbox: Inbox) -> None:
+    def flush(self, inbox: "Loop") -> None:
         """The test is over: deliver what waits for a step that will not come."""
         for envelope in self._collected:
             if not self._is_known(_key(envelope)):
@@ -235,7 +238,7 @@ class LockstepClock(Clock):
     def has_new_picture(self) -> bool:
         return bool(self._announcer.new)
 
-    def steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+    def steps(self, period: Fraction | int, inbox: "Loop", stopped: Callable[[], bool]) -> Iterator[int]:
         """As ``Clock.steps``; messages are delivered in the order of their sample times."""
         consumes = [] if inbox.observes else sorted(inbox.consumes)
         self._about = About(self._address, len(self._announcer.memories), consumes)
@@ -245,7 +248,7 @@ class LockstepClock(Clock):
                 self._observer.collect(envelope)
             self._observer.flush(inbox)
 
-    def _steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+    def _steps(self, period: Fraction | int, inbox: "Loop", stopped: Callable[[], bool]) -> Iterator[int]:
         number, due = 0, EPOCH
         while (command := self._command(inbox, stopped)) is not None:
             if isinstance(command, Show):
@@ -280,7 +283,7 @@ class LockstepClock(Clock):
         self._answer()
         return True
 
-    def _hand(self, envelope: Envelope, inbox: Inbox) -> None:
+    def _hand(self, envelope: Envelope, inbox: "Loop") -> None:
         """Where the application's time is the test's, the service learns when it was sent."""
         now = self._now
         self._now = envelope.received if _is_of_test(envelope.received) else now
@@ -312,7 +315,7 @@ class LockstepClock(Clock):
         if self._announcer.memories:
             look_until(stopped)
 
-    def _command(self, inbox: Inbox, stopped: Callable[[], bool]) -> Step | Show | None:
+    def _command(self, inbox: "Loop", stopped: Callable[[], bool]) -> Step | Show | None:
         """The next command; None when the service is to stop."""
         while not (stopped() or self._source.is_over):
             if command := self._source.next(inbox.observes, self._observer.collect):

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dodo_dsl.opendlv.address import HEADER_BYTES, Address, body_length
 from dodo_dsl.opendlv.channel import Done, Step
@@ -16,9 +16,12 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
-from services.base.clock import Clock, Inbox
+from services.base.clock import Clock
 from services.base.evaluator import UnjudgeableError
 from services.base.lockstep_clock import RECORDED_STEP, RECORDING_END, LockstepClock
+
+if TYPE_CHECKING:
+    from services.base.loop import Loop
 
 
 class RecordedStep(NamedTuple):
@@ -113,7 +116,7 @@ class RecordingClock(Clock):
     def now(self) -> int:
         return self._now
 
-    def steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+    def steps(self, period: Fraction | int, inbox: "Loop", stopped: Callable[[], bool]) -> Iterator[int]:
         number, due, start = 0, 0, 0
         for envelope in self._arrivals():
             start = start or envelope.received

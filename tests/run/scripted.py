@@ -12,7 +12,8 @@ from typing import Any, TypeVar
 from dodo_dsl.plan.model import Application, ApplicationService, Lockstep, Plan, PlannedService
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
-from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, Unmatched, VerdictEvent
+from dodo_dsl.run.protocol import BackendError, Event, Exited, Ready, Unmatched, VerdictEvent
+from dodo_dsl.run.sides import Backend
 
 T = TypeVar("T")
 Events = Sequence[tuple[float, Event]]

@@ -307,7 +307,7 @@ class Waiting(ScriptedBackend):
 def test_one_that_waits_for_others_has_the_time_that_these_may_take() -> None:
     services = (ApplicationService("app", after={"db": "service_healthy"}), ApplicationService("db"))
     tested = plan(application=Application(".", services))
-    reason = f"service 'app' was not ready within {2 * LONGEST_S + READY_PATIENCE_S:g} s"
+    reason = f"service 'app' was not ready within {3 * LONGEST_S + READY_PATIENCE_S:g} s"
     found = outcome(Waiting(tested, {**READY, "application": [(1.0, Ready("db"))]}))
     assert (found.outcome, found.reason) == ("error", reason)
 

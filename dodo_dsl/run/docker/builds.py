@@ -9,7 +9,6 @@ import json
 import os
 import re
 import shutil
-import stat
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -95,20 +94,17 @@ class _Contexts:
     def _copy(self, place: Path) -> str:
         """A copy under the folder's own name, by which builders find what they got of it before."""
         target = self._copies / str(len(self._copied)) / (place.name or "root")
-        shutil.copytree(place, target, symlinks=True, ignore=self._left_out, copy_function=_link)
+
+        def left_out(folder: str, names: Sequence[str]) -> set[str]:
+            found = {name: Path(folder, name) for name in names}
+            return {name for name, path in found.items() if name == _GIT or path in self._hidden or _is_odd(path)}
+
+        shutil.copytree(place, target, symlinks=True, ignore=left_out, copy_function=_link)
         return str(target)
 
-    def _left_out(self, folder: str, names: Sequence[str]) -> set[str]:
-        return {name for name in names if self._is_left_out(folder, name)}
 
-    def _is_left_out(self, folder: str, name: str) -> bool:
-        path = os.path.join(folder, name)  # noqa: PTH118  (one of very many)
-        if name == _GIT or Path(path) in self._hidden:
-            return True
-        kind = os.lstat(path).st_mode
-        if stat.S_ISDIR(kind):
-            return not os.access(path, os.R_OK | os.X_OK)
-        return not stat.S_ISREG(kind) and not stat.S_ISLNK(kind)
+def _is_odd(path: Path) -> bool:
+    return not (path.is_symlink() or path.is_dir() or path.is_file())
 
 
 def _link(source: str, target: str) -> None:

@@ -9,10 +9,11 @@ from typing import Any
 from dodo_dsl.run import leases
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.process.host_isolation import is_claimed
-from dodo_dsl.run.protocol import Backend, BackendError, Say
+from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.run.rigs.leases import device_leases, devices_of, quarantined
 from dodo_dsl.run.rigs.permission import refuse_test
 from dodo_dsl.run.rigs.problems import RigProblem
+from dodo_dsl.run.sides import Backend
 
 Open = Callable[[Job], AbstractAsyncContextManager[Backend]]
 

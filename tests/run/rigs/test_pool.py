@@ -7,18 +7,21 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 
 from dodo_dsl.plan.model import Flag, PlannedService, Pooled
 from dodo_dsl.run import leases
-from dodo_dsl.run.attempts import Attempts
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.process import host_isolation
-from dodo_dsl.run.protocol import Backend, BackendError, Ready
+from dodo_dsl.run.protocol import BackendError, Ready
 from dodo_dsl.run.rigs.leases import leased, quarantine
 from dodo_dsl.run.rigs.pool import opened
+from dodo_dsl.run.runner import Policy, Runner
+from dodo_dsl.run.schedule import schedule
+from dodo_dsl.run.sides import Backend
 from tests.run.scripted import ScriptedBackend, drives, one_by_one, plan, run
 
 DEVICES = {"kiwi-1": "/dev/null", "kiwi-2": "/dev/zero"}
@@ -123,7 +126,8 @@ def test_the_outcome_names_the_rig() -> None:
 
     held = leases.try_lease("cid-121", {"test": "theirs"})
     assert held is not None
-    attempts = Attempts(cast(Any, Backends()), lambda *_: None, 0, False, lambda: False, lambda *_: None)
-    outcome = run(attempts.outcome(pool()))
+    quiet = SimpleNamespace(phase=lambda *_: None, standing=lambda *_: None)
+    runner = Runner(cast(Any, quiet), cast(Any, Backends()), schedule(1, lambda _: 1.0), Policy())
+    outcome = run(runner._outcome(pool()))
     held.release()
     assert (outcome.outcome, outcome.slug, outcome.notes) == ("passed", "any", ("ran on rig 'kiwi-2'",))

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from dodo_dsl.plan.model import COMPLETED, HEALTHY, STARTED, ApplicationService
-from dodo_dsl.run.start_order import LONGEST_S, Conditions, in_turn, longest_s, may_end, optional
+from dodo_dsl.run.start_order import Conditions, in_turn, may_end, optional
 from tests.run.scripted import run
 
 DB = ApplicationService("db")
@@ -71,12 +71,6 @@ def test_the_health_of_one_that_has_started(what: tuple[Any, ...], why: str) -> 
         return await conditions.ill("app", 60.0)
 
     assert run(ill()) == why
-
-
-def test_how_long_one_may_wait_is_by_those_for_which_it_waits() -> None:
-    first = ApplicationService("first", after={"app": STARTED, "db": HEALTHY})
-    services = (first, *app(COMPLETED))
-    assert [longest_s(services, name) for name in ("first", "app", "db")] == [2 * LONGEST_S, LONGEST_S, 0.0]
 
 
 def test_an_exception_in_the_start_of_one_is_told() -> None:
