@@ -66,21 +66,11 @@ def _state() -> Iterator[Path]:
 
 @functools.cache
 def own_data() -> tuple[Path, ...]:
-    """Where DoDo's tests lie, however it is installed, also next to other Pythons that an application sees."""
+    """Where DoDo's tests lie, however it is installed."""
     root = package_data.root()
-    optional = [path for path in _entries(Path("/opt")) if path.is_dir()]
-    prefixes = [*map(Path, (*INTERPRETER, "/usr", "/usr/local")), *optional]
-    found = [data for prefix in prefixes for data in prefix.glob(package_data.INSTALLED)]
+    found = [data for prefix in map(Path, INTERPRETER) for data in prefix.glob(package_data.INSTALLED)]
     found += [Path(place, "dodo_dsl", "_data") for place in sys.path]
-    for checkout in (root, *optional):
-        if (checkout / "dodo_dsl").is_dir():
-            found += [checkout, *(checkout / name for name in _OF_CHECKOUT), checkout / ".git"]
+    if (root / "dodo_dsl").is_dir():
+        found += [root, *(root / name for name in _OF_CHECKOUT), root / ".git"]
     there = (Path(os.path.realpath(path)) for path in (*found, root / "tests_registry") if path.is_dir())
     return tuple(dict.fromkeys(there))
-
-
-def _entries(folder: Path) -> Iterator[Path]:
-    try:
-        yield from folder.iterdir()
-    except OSError:
-        return

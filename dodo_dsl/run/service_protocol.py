@@ -19,16 +19,12 @@ from dodo_dsl.outcome import with_margin
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.protocol import (
     Event,
-    Foreign,
     GivenVerdict,
-    InputEnded,
     Late,
     Malformed,
-    MemoryTaken,
     Message,
     Noted,
     Ready,
-    Stopped,
     VerdictEvent,
 )
 from dodo_dsl.run.service_output import ServiceOutput
@@ -66,18 +62,9 @@ def read(service: str, is_evaluator: bool, message: bytes) -> Event | None:
 
 def _words(event: Event) -> str:
     """What the log of a service has of what it said; empty for what comes again and again."""
-    match event:
-        case Ready():
-            return "ready"
-        case InputEnded():
-            return "end-of-input"
-        case VerdictEvent():
-            return f"verdict: {'passed' if event.passed else 'failed'}: {event.reason}"
-        case Stopped() | Foreign():
-            return event.reason
-        case Noted() | MemoryTaken():
-            return event.text
-    return ""
+    if isinstance(event, VerdictEvent):
+        return f"verdict: {'passed' if event.passed else 'failed'}: {event.reason}"
+    return "ready" if isinstance(event, Ready) else getattr(event, "reason", "") or getattr(event, "text", "")
 
 
 class Reports:

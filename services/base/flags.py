@@ -30,12 +30,6 @@ COMMON: dict[str, About] = {
         "maximum": 4_294_967_295,
         "help": "Sender stamp of messages, where no parameter sets another.",
     },
-    "log-id": {
-        "type": "integer",
-        "minimum": 0,
-        "maximum": 4_294_967_295,
-        "help": "Sender stamp under which log lines are also sent as LogMessage; by default they are not.",
-    },
     "ends-input": {
         "type": "boolean",
         "default": False,

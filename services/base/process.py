@@ -1,7 +1,6 @@
 """A service as a process: flags, log, signals, readiness, and its exit code.
 
-Its log is also sent on the bus, as LogMessages. Signals also end a service that is being built, which may wait for
-hardware.
+Signals also end a service that is being built, which may wait for hardware.
 """
 
 import contextlib
@@ -13,7 +12,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -22,8 +21,8 @@ from google.protobuf.message import Message
 
 from dodo_dsl.opendlv import address_book
 from dodo_dsl.opendlv.address import is_of_the_world
-from dodo_dsl.opendlv.message_set import MessageError, MessageSet
-from dodo_dsl.opendlv.session import Session, SessionError
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import MemoryTakenError
 from services.base.clock import Clock, RealTimeClock
 from services.base.flags import Flags, FlagsError, load_manifest, parse
@@ -63,47 +62,6 @@ def _unknown_field(error: Exception) -> str:
     about = error.obj.DESCRIPTOR
     fields = ", ".join(field.name for field in about.fields)
     return f"{about.full_name} has no field '{error.name}'; it has {fields or 'no fields'}"
-
-
-LOG_MESSAGE = "opendlv.system.LogMessage"
-SEVERITIES = ((logging.CRITICAL, 2), (logging.ERROR, 3), (logging.WARNING, 4), (logging.INFO, 6), (logging.DEBUG, 7))
-"""The severity (RFC 5424, table 2) of lines from each level on; 6 is the message's default."""
-LONGEST = 1000
-
-
-@contextmanager
-def published(session: Session, sender_stamp: int | None) -> Iterator[None]:
-    """Send the log, and the error that ends the service, under a sender stamp; None sends nothing."""
-    if sender_stamp is None:
-        yield
-        return
-    handler = _LogSender(session, sender_stamp)
-    logging.getLogger().addHandler(handler)
-    try:
-        yield
-    except Exception as error:
-        handler.send(logging.CRITICAL, str(error) or type(error).__name__)
-        raise
-    finally:
-        logging.getLogger().removeHandler(handler)
-
-
-class _LogSender(logging.Handler):
-    """Sends log lines; one that cannot be sent is still in the log on stderr."""
-
-    def __init__(self, session: Session, sender_stamp: int) -> None:
-        super().__init__()
-        self._session, self._stamp = session, sender_stamp
-        self._type = session.messages.type(LOG_MESSAGE)
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.send(record.levelno, record.getMessage())
-
-    def send(self, level: int, text: str) -> None:
-        severity = next((number for least, number in SEVERITIES if level >= least), 7)
-        description = " ".join(text.split())[:LONGEST]
-        with suppress(SessionError, MessageError):
-            self._session.send(self._type(level=severity, description=description), None, self._stamp)
 
 
 DONE, BROKEN, USAGE = 0, 1, 2
@@ -161,7 +119,6 @@ def _serve(
         with ExitStack() as resources:
             session = resources.enter_context(_session(flags["cid"], _messages(manifest, folder)))
             world = World.load(session.messages)
-            resources.enter_context(published(session, flags["log-id"]))
             if clock is None:
                 with interruptible():  # it waits for the clock service
                     if stop():
@@ -207,7 +164,7 @@ def _messages(manifest: Mapping[str, Any], folder: Path) -> MessageSet:
     """The standard messages and those of the test's own ODVD files, which replace none that DoDo's services name."""
     own = (Path(p) for p in os.environ.get("DODO_ODVD", "").split(os.pathsep) if p)
     choices = [each.get("choices") for each in manifest.get("parameters", {}).values()]
-    named = LOG_MESSAGE + str([manifest.get("messages"), choices] * (folder.resolve().parent == _BASE.parent))
+    named = str([manifest.get("messages"), choices] * (folder.resolve().parent == _BASE.parent))
     kept = {name for name in MessageSet.standard().names() if is_of_the_world(name) or name in named}
     return MessageSet.load(*own, kept=kept)
 

@@ -19,7 +19,6 @@ def test_values_have_their_types_and_defaults() -> None:
         "walls": ["left", "right"],
         "cid": 128,
         "id": 7,
-        "log-id": None,
         "ends-input": False,
         "verbose": True,
     }

@@ -16,7 +16,6 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
 from tests.services.base.conftest import ROOT, Start
-from tests.services.process import receive
 
 MESSAGES = MessageSet.standard()
 READY = {"dodo": "ready"}
@@ -189,17 +188,3 @@ def test_starting_up_is_light() -> None:
     code = "import sys, services.base; print(sorted({'numpy', 'cv2', 'jsonschema'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
-
-
-LOG = "opendlv.system.LogMessage"
-LAST = "the last line of this test"
-
-
-def test_a_service_says_on_the_bus_what_it_logs_where_it_is_asked_to(start: Start, cid: int) -> None:
-    with Session(cid) as session:
-        assert start("--role=broken").end()[0] == 1
-        service = start("--role=broken", "--log-id=9")
-        message = receive(session, LOG, 9)[1]
-        assert (message.level, message.description) == (2, "a model went wrong")
-        assert service.end()[0] == 1
-        assert session.receive(0.0) is None
