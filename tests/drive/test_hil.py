@@ -2,13 +2,7 @@
 
 import json
 import math
-import os
 import re
-import shutil
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +12,11 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
-from dodo_dsl.cli.main import main
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
 from services.gantry.rig_table import BOUNDS, MICROSTEP
 from tests.drive.applications import KIWI, ROOT, dodo, kiwi, results
 from tests.drive.variants import registry, variant
-from tests.realtime import hurry
-from tests.run.desk import processes_with
 
 LABELLED = """
 record: {frames: 2 Hz}
@@ -95,32 +86,6 @@ def test_the_emulated_rig_reaches_the_goal_within_its_limits(tmp_path: Path) -> 
     assert re.search(r"turns of 50 ms, \d+ without an answer; jitter median .* ms; position after median .* ms", log)
 
 
-def test_an_emulated_rig_that_is_held_up_for_a_moment_drives_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It stands still meanwhile, and the result says for how long."""
-    firmware = tmp_path / "firmware"
-    shutil.copytree(ROOT / "build" / "firmware", firmware)
-    monkeypatch.setenv("DODO_FIRMWARE", str(firmware))
-    words = [sys.executable, "-m", "dodo_dsl", "run", "hil-dynamic", "--report", tmp_path / "report"]
-    with subprocess.Popen(words, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
-        hurry(process.pid)
-        assert process.stdout is not None
-        output = []
-        for line in process.stdout:
-            output.append(line)
-            if line.endswith("  running\n"):
-                time.sleep(0.5)
-                (emulator,) = processes_with(f"{firmware}/rig-emulator")
-                os.kill(int(emulator), signal.SIGSTOP)
-                time.sleep(0.12)
-                os.kill(int(emulator), signal.SIGCONT)
-    assert process.returncode == 0, "".join(output)
-    (test,) = results(tmp_path / "report").values()
-    assert 0.1 < test["machine"]["paused_s"] <= 0.25
-    assert "the emulated rig stood still for 0." in (tmp_path / "report" / "index.html").read_text()
-
-
 @pytest.mark.parametrize("laps", [1, pytest.param(2, marks=pytest.mark.proof)])
 def test_laps_on_the_rig_that_turns_without_end(tmp_path: Path, laps: int) -> None:
     """A turn of the yaw each, past its index, after which it still knows its heading."""
@@ -159,23 +124,6 @@ def test_the_rig_goes_its_way_whatever_the_application_does(tmp_path: Path, stee
     same_at_rest(measured[-1], true[-1])
     way = np.loadtxt(ROOT / "tests_registry" / "targets" / "rig-straight.csv", delimiter=",", skiprows=1)
     assert np.abs(true[[0, -1], 1:3] - way[[0, -1], 1:3]).max() < 0.02
-
-
-def test_a_test_as_dodo_new_writes_it_passes_on_the_rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    for words in (["new", "--deployment"], ["new", "mine", "--level", "hil"]):
-        assert main(words, sys.stdout, sys.stderr) == 0
-    application = str(ROOT / "examples" / "kiwi" / "docker-compose.yml")
-    words = (str(tmp_path / "tests" / "mine"), "--application", application, "--retry-errors", "2")
-    dodo("run", *words, "--report", str(tmp_path / "report"), code=0)
-    assert [test["outcome"] for test in results(tmp_path / "report").values()] == ["passed", "passed"]
-
-
-@pytest.mark.proof
-def test_the_static_rig_in_the_dusk_before_a_background(tmp_path: Path) -> None:
-    test = run(tmp_path, "hil-camera-scenes[light=0.5,clutter=60]", code=0)
-    counts = {check["name"]: check["value"] for check in test["checks"]}
-    assert counts["false-positives"] > 20 < counts["true-positives"], "it is neither dark nor full"
 
 
 def shows_its_board(report: Path) -> None:

@@ -90,11 +90,6 @@ CASES = (
         environment={"HOME": "/proc", "XDG_STATE_HOME": "/proc/a", "XDG_CACHE_HOME": "/proc/b", "TMPDIR": "/dev/shm"},
     ),
     Case(
-        "report, HOME and TMPDIR not UTF-8",
-        report=NOT_UTF8,
-        environment={"HOME": f"{{scratch}}/{NOT_UTF8}", "TMPDIR": f"{{scratch}}/{NOT_UTF8}"},
-    ),
-    Case(
         "subfolder of a worktree, locale POSIX, HOME relative, TMPDIR among the tests",
         "größe",
         made="worktree",
@@ -102,14 +97,6 @@ CASES = (
         environment={"LC_ALL": "POSIX", "PYTHONUTF8": "1", "HOME": "relative", "TMPDIR": "{checkout}/tests"},
     ),
     Case("not UTF-8 in ASCII", NOT_UTF8, environment=IN_ASCII, code=2, says="/caf\\xe9' is not UTF-8"),
-    Case(
-        "odd path compiled elsewhere from a subfolder",
-        ODD,
-        at="{checkout}/tests",
-        words=("compile", "-o", "{report}"),
-        report="{scratch}/generated",
-    ),
-    Case("a new test from a subfolder", at="{checkout}/tests", words=("new", "sil-more")),
 )
 
 

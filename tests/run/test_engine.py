@@ -12,7 +12,6 @@ from dodo_dsl.outcome import MachineLoad, Outcome
 from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Flag, Lockstep, Plan
 from dodo_dsl.run import listeners, run_state
 from dodo_dsl.run.engine import (
-    BEGIN_PATIENCE_S,
     LAST_TIME_PATIENCE_S,
     LISTEN_PATIENCE_S,
     LISTEN_PERIOD_S,
@@ -258,12 +257,6 @@ def test_what_happens_after_the_begin(case: str) -> None:
     assert (found.outcome, found.reason) == (expected, reason)
 
 
-def test_what_an_unknown_service_sends_may_be_a_flood_of_its_own() -> None:
-    camera, track = plan().services
-    found = begun(flood("a.M"), tested=plan(services=(replace(camera, uses="x"), track)))
-    assert (found.outcome, found.reason) == ("error", f"{FLOOD} a.M/0, which service 'camera' sends")
-
-
 ILL = "ended with exit code 1 during set-up"
 SET_UP: dict[str, tuple[dict[str, Events], str]] = {
     "camera ends early": (
@@ -491,14 +484,6 @@ def test_the_last_time_is_not_waited_for_without_end(more: list[tuple[float, Eve
     assert (found.outcome, found.sim_s, end) == ("passed", 9.0, ended)
 
 
-def test_the_begin_is_announced_until_the_clock_answers() -> None:
-    backend = clocked(
-        (3.5 * BEGIN_PATIENCE_S, Time(0.0, False)), (30.0, PASSED), (30.0, ENDED), (30.0, Time(1.0, True))
-    )
-    assert outcome(backend).outcome == "passed"
-    assert backend.calls.count("begin") == 4
-
-
 STOPS: list[tuple[str, str, str, Callable[[Outcome], bool]]] = [
     ("unanswered", "failed", "'app' has not answered picture 3", lambda o: o.last_lines == ("app says",)),
     ("stuck", "error", "service 'camera' is stuck", lambda o: o.last_lines == ("clock says",)),
@@ -542,12 +527,6 @@ def test_in_lockstep_it_begins_when_the_application_rests() -> None:
     backend.plan, backend.by_answers = replace(backend.plan, lockstep=Lockstep(1, 60.0)), False
     found = outcome(backend)
     assert (found.outcome, found.notes, found.setup_s) == ("passed", (), pytest.approx(8.0))
-
-
-def test_who_ends_instead_of_listening_is_not_waited_for() -> None:
-    found = outcome(consuming({}, {**drives(), "application": [(1.0, Exited("driver", 3))]}))
-    ended = "application service 'driver' ended with exit code 3 during set-up, before the test was decided"
-    assert (found.outcome, found.reason) == ("failed", ended)
 
 
 def test_what_is_written_after_the_decision_is_not_quoted() -> None:

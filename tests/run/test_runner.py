@@ -194,12 +194,6 @@ def test_a_machine_that_stays_too_busy_is_an_error(scene: Scene, retries: int) -
     assert len(a.notes) == retries + 1
 
 
-def test_a_kept_test_is_explained_and_not_tried_again(scene: Scene) -> None:
-    scene.backends.make = always_too_busy
-    assert endings(scene.run(plan("a"), keep=True)) == [("a", "error", TOO_BUSY)]
-    assert (scene.backends.began, scene.runner.kept) == (["a"], ["look inside"])
-
-
 @pytest.mark.parametrize(
     ("retries", "stages", "expected", "attempts"),
     [(0, CRASH, "error", 1), (2, CRASH, "error", 3), (2, drives(1.0, FAILED), "failed", 1)],
@@ -227,12 +221,6 @@ def test_an_error_of_one_job_is_its_outcome_alone(scene: Scene, problem: Excepti
 
     scene.backends.make = make
     assert endings(scene.run(*plans("ab"))) == [("a", "error", reason), ("b", "passed", "it drove")]
-
-
-def test_backends_that_make_none_are_the_error_of_each_test(scene: Scene) -> None:
-    scene.backends.open_problem = BackendError("no Docker engine answers")
-    assert {(o.outcome, o.reason) for o in scene.run(*plans("ab"))} == {("error", "no Docker engine answers")}
-    assert scene.backends.closed == 1
 
 
 @pytest.mark.parametrize(

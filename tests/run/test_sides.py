@@ -6,7 +6,7 @@ from unittest import mock
 import pytest
 
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
-from dodo_dsl.run.sides import Sides, WatchedServices
+from dodo_dsl.run.sides import Backend, WatchedServices
 from tests.run.scripted import plan, run
 
 OWN, APP = Snapshot(1.0, {"camera": Used(1.0)}, 2, 3.0), Snapshot(1.5, {"app": Used(2.0)}, 2, 3.5)
@@ -31,7 +31,7 @@ def test_two_sides_are_one_backend(
     second.open.return_value, second.use.return_value, second.close.return_value = 17, application, ["application"]
     second.beginning.return_value = ()
 
-    async def drive(sides: Sides) -> list[str]:
+    async def drive(sides: Backend) -> list[str]:
         await sides.open()
         for layer in ("environment", "application"):
             await sides.start(layer)
@@ -40,7 +40,7 @@ def test_two_sides_are_one_backend(
         return await sides.close(keep=True)
 
     watched = WatchedServices(plan(), tmp_path, tmp_path)
-    assert run(drive(Sides("mixed", 130, False, watched, first, second))) == ["own", "application"]
+    assert run(drive(Backend("mixed", 130, False, watched, first, second))) == ["own", "application"]
     first.open.assert_awaited_once_with(17)
     first.start.assert_awaited_once_with("environment")
     second.start.assert_awaited_once_with("application")

@@ -97,11 +97,6 @@ def test_what_lies_over_mounts(mount: Any, targets: list[str], folder: Path) -> 
     assert {m["target"] for m in found if m["type"] == "bind"} == {t for t in targets if t.endswith("dodo.yml")}
 
 
-def test_a_mount_has_one_place(folder: Path) -> None:
-    (mask,) = volumes("../../tests:/t:ro", folder=folder)
-    assert mask == {"type": "tmpfs", "target": "/t", "read_only": True}
-
-
 @pytest.mark.parametrize(
     ("services", "more", "said"),
     [
@@ -115,15 +110,6 @@ def test_what_leads_elsewhere_since(services: Any, more: Any, said: str, folder:
     (folder.parents[1] / "out").symlink_to("/etc")
     with pytest.raises(BackendError, match=said):
         read(planned({"app": services}, **more), folder)
-
-
-def test_only_services_of_dodo_meet_on_the_host(folder: Path) -> None:
-    compose = read(planned({"app": {"image": "a"}}), folder)
-    assert compose.document()["services"].keys() == {"app"}
-    compose.channel = "/tmp/channel"
-    services = compose.document()["services"]
-    meet = {"type": "bind", "source": "/tmp/channel", "target": "/dodo/channel"}
-    assert {name for name, service in services.items() if meet in service.get("volumes", ())} == {"camera", "track"}
 
 
 def test_a_docker_command_that_cannot_compose(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,17 +27,6 @@ def failing(times: int) -> tuple[list[int], Callable[[], Coroutine[None, None, s
     return tries, work
 
 
-def test_tests_at_once_share_one_try_and_its_failure() -> None:
-    tries, work = failing(1)
-
-    async def scene() -> list[str | BaseException]:
-        pulls = Pulls(None)
-        return await asyncio.gather(*(pulls.once("image", work) for _ in range(3)), return_exceptions=True)
-
-    assert [str(answer) for answer in asyncio.run(scene())] == ["the registry is away"] * 3
-    assert len(tries) == 1
-
-
 def test_what_failed_is_tried_again_and_then_kept() -> None:
     tries, work = failing(1)
 

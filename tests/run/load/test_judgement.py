@@ -17,7 +17,6 @@ from dodo_dsl.outcome import (
 from dodo_dsl.plan.model import Lockstep
 from dodo_dsl.run.machine_load.judgement import (
     UNMEASURED,
-    UNSEEN_USE,
     consider,
     judged_response,
     judged_use,
@@ -172,10 +171,3 @@ def test_limits_of_use_are_checks(key: str, most: float, name: str, value: float
     assert found.findings == (Finding("failed", f"application service 'vision' {reason}", "vision"),), "no verdict"
     both = judged_use([LEAKS, QUIET], ResourceLimits(**{key: value}))
     assert [(each["name"], each["ok"]) for each in both.checks][1:] == [(f"{name}-steering", True)]
-
-
-def test_what_cannot_be_judged_is_said() -> None:
-    limits = ResourceLimits(max_memory_growth=1.0)
-    assert judged_use([], limits).notes == (UNSEEN_USE,)
-    (note,) = judged_use([replace(QUIET, memory_growth_bytes_per_s=None)], limits).notes
-    assert note == "memory-growth of service 'steering' is not judged: the test was too short to measure it"

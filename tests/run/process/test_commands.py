@@ -1,13 +1,11 @@
 """What the process backend makes of services: their words, their variables, and where they come from."""
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from dodo_dsl.application.interpolation import EnvironmentProblem
-from dodo_dsl.plan.model import PlannedService
 from dodo_dsl.run.process.commands import Command, Commands
 from dodo_dsl.run.process.slot import Slot
 from tests.application.compiled import FILE, compiled, repository
@@ -108,24 +106,3 @@ def test_a_nul_character_is_named_without_its_value(tmp_path: Path, where: str) 
     what = {"environment": "variable LOG", "process": "the command"}[where]
     with pytest.raises(EnvironmentProblem, match=f"^{what} of '{app.name}' holds a NUL character"):
         Commands(one, tmp_path, tmp_path, Slot(150)).of(app)
-
-
-def own_path(process: tuple[str, ...], folder: Path) -> list[str]:
-    """Where a service's Python looks first, in a test with own services in two places."""
-    service = PlannedService("evaluation", "judge", "judge", "dodo/judge:1", process)
-    plan = scripted.plan(services=(service,), import_paths=("../..", "../../../more"))
-    made = Commands(plan, folder, folder / "report", Slot(150)).of(service)
-    return made.environment["PYTHONPATH"].split(os.pathsep)
-
-
-def test_own_services_find_their_packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONPATH", "/users")
-    repository = tmp_path / "repository"
-    places = own_path(("python", "-m", "my_services.judge"), repository / "generated/t")
-    assert places[-3:] == [str(repository), str(tmp_path / "more"), "/users"]
-    assert own_path(("python", "-m", "services.collision"), repository / "generated/t") == [*places[:-3], "/users"]
-
-
-def test_an_application_does_not_find_own_services(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONPATH", "/users")
-    assert command(tmp_path, monkeypatch).environment["PYTHONPATH"] == "/users"

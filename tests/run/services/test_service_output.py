@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import os
-import tempfile
 import threading
 import time
 import tty
@@ -11,8 +10,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from dodo_dsl.run import service_output
 from dodo_dsl.run.service_output import ServiceOutput
@@ -52,22 +49,6 @@ class Read:
     def _take(self, line: bytes) -> bool:
         self.lines.append(line)
         return line.startswith(b"{")
-
-
-CHUNKS = st.lists(st.binary(max_size=40) | st.sampled_from([b"\n", b"a\n", b'{"dodo": "ready"}\n']), max_size=20)
-
-
-@given(CHUNKS, st.booleans())
-@pytest.mark.thorough
-def test_lines_do_not_depend_on_how_they_were_written(chunks: list[bytes], terminal: bool) -> None:
-    """Nor on a terminal, which changes and repeats nothing: no ends of lines, no control characters."""
-    with tempfile.TemporaryDirectory() as folder:
-        read = Read(Path(folder), chunks, terminal=terminal)
-    *lines, rest = b"".join(chunks).split(b"\n")
-    log = b"".join(line + b"\n" for line in lines if not line.startswith(b"{")) + rest * (not rest.startswith(b"{"))
-    assert (read.log, read.lines) == (log, [line for line in [*lines, rest] if line.strip()])
-    log_lines = [line for line in read.lines if not line.startswith(b"{")]
-    assert read.tail == [line.decode("utf-8", "replace") for line in log_lines[-8:]]
 
 
 def test_the_returns_of_a_terminal_in_a_container_are_taken_off(tmp_path: Path) -> None:

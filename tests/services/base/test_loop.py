@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import RealTimeClock
-from services.base.loop import HeardStamps, Lateness, Loop, with_strangers
+from services.base.loop import HeardStamps, Lateness, Loop
 from services.base.service import Service
 
 STEER, PEDAL = 1090, 1086
@@ -36,13 +36,6 @@ def test_only_a_stamp_that_never_came_is_told_and_only_beside_strangers(those: l
     unheard = [stamp for stamp in (0, 9) if stamp not in those]
     has_strangers = any(stamp not in (0, 9) for stamp in those)
     assert [int(text.split("/")[1].split()[0]) for text in told] == (unheard if has_strangers else [])
-
-
-def test_the_reason_goes_on_with_them() -> None:
-    assert with_strangers("no sample came", ["no X/0 came, but 1 with sender stamp 2"]) == (
-        "no sample came; no X/0 came, but 1 with sender stamp 2"
-    )
-    assert with_strangers("no sample came", []) == "no sample came"
 
 
 class Losing(Session):
@@ -87,12 +80,3 @@ def test_updates_that_were_skipped_are_late() -> None:
     lateness.add(16_667, 16_667)
     lateness.add(1_000_000, 1_000_000)
     assert lateness.news() == {"updates": 61, "late": 58, "worst_s": 0.0}
-
-
-def test_a_short_period_or_another_limit() -> None:
-    for lateness, most in ((Lateness(1000, None), 10_000), (Lateness(1000, 25_000.0), 25_000)):
-        lateness.begin()
-        lateness.add(0, most)
-        assert lateness.news() is None
-        lateness.add(1000, 1001 + most)
-        assert lateness.news() is not None

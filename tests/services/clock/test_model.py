@@ -12,7 +12,7 @@ from services.base.lockstep_clock import EPOCH, AnnouncedMemory
 from services.clock import model
 from services.clock.exchange import ApplicationSilent, Patience, ServiceSilent, TimeOver
 from services.clock.model import Stepper
-from tests.services.clock.toys import BOX, DRIVE, STEP, Eye, Film, Filter, Mover, Toys, Watcher
+from tests.services.clock.toys import BOX, DRIVE, STEP, Filter, Mover, Toys, Watcher
 
 Way = list[tuple[int, float]]
 
@@ -89,37 +89,6 @@ def test_an_application_without_a_camera_may_answer_at_once(toys: Toys) -> None:
     way, stepper = toys.run(Filter(toys.cid))
     assert len(way) == 201
     assert stepper.application.frames == 21
-
-
-@pytest.mark.thorough
-def test_two_cameras_each_with_a_reader_of_its_own(toys: Toys) -> None:
-    """One answers at once and long before the other is even seen."""
-    toys.cast = {**DRIVE, "other": lambda _, memory: Eye(memory())}
-    slow = toys.application("other", times=0, boxes=1, pause=lambda _: 0.02)
-    way, _ = toys.run(toys.application(), slow)
-    assert close(way, expected(21))
-    assert len(slow.seen) in (20, 21)
-
-
-@pytest.mark.thorough
-def test_a_slow_reader_beside_the_one_that_answers_sees_each_picture_once(toys: Toys) -> None:
-    """It is told of a picture, and gets to it when the next one is drawn already."""
-    toys.readers = 2
-    slow = toys.application(times=0, delay=0.02)
-    toys.run(toys.application(), slow)
-    assert close([(0, place) for place in slow.seen], [(0, place) for _, place in expected(21)[::10][: len(slow.seen)]])
-    assert len(slow.seen) in (20, 21)
-
-
-@pytest.mark.parametrize("manner", [{}, {"pause": lambda _: 0.02}])
-def test_a_film_is_seen_to_its_last_picture_and_no_picture_twice(toys: Toys, manner: dict[str, Any]) -> None:
-    toys.cast = {"film": lambda _, memory: Film(memory(), 5)}
-    toys.relayed = (BOX,)
-    application = toys.application("film", boxes=1, **manner)
-    _, stepper = toys.run(application)
-    assert application.seen == [1, 2, 3, 4, 5]
-    assert [number for _, number in toys.evaluator.boxes] == [1, 2, 3, 4, 5]
-    assert stepper.application.frames == 5
 
 
 def test_the_test_time_is_limited(toys: Toys) -> None:
