@@ -48,18 +48,18 @@ target "service" {
       { name = "gantry", stage = "rig" },
       { name = "inertial-sensor", stage = "base" },
       { name = "integrator", stage = "base" },
-      { name = "lidar", stage = "vision" },
+      { name = "lidar", stage = "pictures" },
       { name = "object-detection", stage = "geometry" },
       { name = "odometry", stage = "base" },
-      { name = "projected-truth", stage = "vision" },
-      { name = "range-finder", stage = "vision" },
+      { name = "projected-truth", stage = "pictures" },
+      { name = "range-finder", stage = "pictures" },
       { name = "rec-recorder", stage = "vision" },
       { name = "rec-replay", stage = "vision" },
       { name = "responds", stage = "geometry" },
       { name = "ros-bridge", stage = "ros" },
       { name = "sandbox", stage = "base" },
       { name = "trajectory-error", stage = "geometry" },
-      { name = "virtual-camera", stage = "vision" },
+      { name = "virtual-camera", stage = "pictures" },
     ]
   }
   name   = image.name

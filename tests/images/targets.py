@@ -28,4 +28,4 @@ def targets() -> dict[str, dict[str, Any]]:
 def folders_of(image: str) -> set[str]:
     """What the image of a service holds of ``services``, beside what all share: its own folder, and often the scene."""
     arguments = targets()[image]["args"]
-    return {arguments["FOLDER"], *(["scene"] if arguments["STAGE"] == "vision" else [])}
+    return {arguments["FOLDER"], *(["scene"] if arguments["STAGE"] in ("pictures", "vision") else [])}
