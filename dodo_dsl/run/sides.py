@@ -5,7 +5,7 @@ Services report to one queue, whichever side has them; all of them start in the 
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Collection, Iterable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -90,15 +90,14 @@ class WatchedServices:
         names: Collection[str],
         start: Callable[[str], Awaitable[None]],
         reports: Iterable[str],
-        patience: Callable[[str], Mapping[str, float]] = lambda _: {},
     ) -> dict[str, bool]:
         """Starts services, those of the application when what they wait for is so; who will report to be ready.
 
-        Those do that wait, and those in ``reports``. ``patience`` of a service is as for ``Conditions.unmet``.
+        Those do that wait, and those in ``reports``.
         """
 
         async def when_met(name: str) -> None:
-            if why := await self.conditions.unmet(name, patience(name), self.note):
+            if why := await self.conditions.unmet(name, self.note):
                 self.not_started(name, why)
             else:
                 await start(name)

@@ -44,21 +44,19 @@ class Conditions:
         for condition in _ASKED:
             self._decide(name, condition, "could not be started")
 
-    async def unmet(self, name: str, patience: Mapping[str, float], note: Callable[[str], None]) -> str:
+    async def unmet(self, name: str, note: Callable[[str], None]) -> str:
         """Waits until a service may start; why it never may, in a sentence, else empty.
 
-        ``patience`` is how long another service may take to be healthy, in s, where that is not LONGEST_S. ``note``
-        gets a sentence for each optional service without which it starts.
+        ``note`` gets a sentence for each optional service without which it starts.
         """
         for other, asked in self.of(name).items():
-            longest = patience.get(other, LONGEST_S) if asked == HEALTHY else LONGEST_S
             why = await self._fact(other, STARTED)
             try:
-                async with asyncio.timeout(longest):
+                async with asyncio.timeout(LONGEST_S):
                     why = why or await self._fact(other, asked)
                 why = why and f"which {why}"
             except TimeoutError:
-                why = f"and it did not within {longest:g} s"
+                why = f"and it did not within {LONGEST_S:g} s"
             if why and other not in self._optional[name]:
                 return f"it waits for '{other}' to {_ASKED[asked]} (depends_on), {why}"
             if why:
@@ -66,13 +64,13 @@ class Conditions:
                 note(f"service '{name}' starts all the same: it waits for '{other}' to {_ASKED[asked]} ({key}), {why}")
         return ""
 
-    async def ill(self, name: str, patience_s: float) -> str:
+    async def ill(self, name: str) -> str:
         """Waits until a service that has started is healthy, or has ended; why it is neither, else empty."""
         try:
-            async with asyncio.timeout(patience_s):
+            async with asyncio.timeout(LONGEST_S):
                 why = await self._fact(name, HEALTHY)
         except TimeoutError:
-            return f"its healthcheck did not succeed within {patience_s:g} s"
+            return f"its healthcheck did not succeed within {LONGEST_S:g} s"
         return "its healthcheck failed" if why == _UNHEALTHY else ""
 
     def _fact(self, name: str, condition: str) -> "asyncio.Future[str]":

@@ -12,7 +12,7 @@ from typing import Any
 from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import RECORDER
-from dodo_dsl.plan.model import HEALTHY, READY_S
+from dodo_dsl.plan.model import HEALTHY
 from dodo_dsl.run.application_time import PAGE_DESTROYED, POSIX_MEMORY
 from dodo_dsl.run.docker import beside_processes, shared_files
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down, writers
@@ -26,7 +26,6 @@ from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import Send
 from dodo_dsl.run.protocol import BackendError, Exited, Lost, Ready, Unstartable
 from dodo_dsl.run.sides import APPLICATION, WatchedServices
-from dodo_dsl.run.start_order import LONGEST_S
 
 _KILLED = 128 + signal.SIGKILL
 """The exit code of a container whose program was killed by a signal that it cannot refuse."""
@@ -231,14 +230,10 @@ class ContainerSide:
         async def start(name: str) -> None:
             await self._start(layer, name)
 
-        started = await self._watched.start(names, start, reports, self._patience)
+        started = await self._watched.start(names, start, reports)
         if layer == APPLICATION:
             await self._require_here()
         return started
-
-    def _patience(self, name: str) -> dict[str, float]:
-        after = self._watched.conditions.of(name)
-        return {other: health_patience_s(self._containers[other]) for other in after if other in self._containers}
 
     async def connect(self) -> Send:
         from docker.errors import DockerException
@@ -272,7 +267,7 @@ class ContainerSide:
         if not self._compose.has_healthcheck(name):
             self._watched.tell(Ready(name))
             return
-        why = await self._watched.conditions.ill(name, health_patience_s(self._containers[name]))
+        why = await self._watched.conditions.ill(name)
         if why and name not in self._watched.may_be_ill:
             self._watched.tell(Unstartable(name, why))
 
@@ -353,11 +348,3 @@ def healthcheck(container: Any) -> dict[str, Any]:
     """The health check of a container, from its compose file or its image; empty without one."""
     check = container.attrs["Config"].get("Healthcheck") or {}
     return {} if (check.get("Test") or ["NONE"]) == ["NONE"] else check
-
-
-def health_patience_s(container: Any) -> float:
-    """How long a container may take to be healthy, in s: beyond all tries that its health check has."""
-    check = healthcheck(container)
-    interval, timeout = (((check.get(key) or 0) / 1e9) or 30.0 for key in ("Interval", "Timeout"))
-    tries = (check.get("StartPeriod") or 0) / 1e9 + (check.get("Retries") or 3) * (interval + timeout)
-    return min(tries + READY_S, LONGEST_S)

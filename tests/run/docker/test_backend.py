@@ -88,10 +88,6 @@ def test_an_optional_service_need_not_be_healthy(tmp_path: Path) -> None:
     assert [type(event) for event in events] == [Ready, Noted], events
 
 
-def test_an_exception_while_one_waits_is_the_test_s_error(tmp_path: Path) -> None:
-    assert in_turn(tmp_path, db=Container(config=""))[1] == [Unstartable("app", "KeyError: 'Config'")]
-
-
 SLOW, BAD = "failed to create shim task: io pipe: context deadline exceeded", "failed to create shim task: no such file"
 
 
