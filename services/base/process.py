@@ -29,7 +29,7 @@ from services.base.flags import Flags, FlagsError, load_manifest, parse
 from services.base.loop import Loop
 from services.base.members import Members, SenderTable, World, channel
 from services.base.runner import connected, say, tell
-from services.base.service import Build, Context, Service, undeclared_checks
+from services.base.service import Build, Context, Service
 
 _OURS = ("dodo_dsl.", "services.")
 _BASE = Path(__file__).resolve().parent
@@ -139,8 +139,6 @@ def _serve(
                 if place or _recording():  # by hand nobody reads it
                     _print_record(service)
             if service.verdict is not None:
-                if undeclared := undeclared_checks(service.verdict, manifest.get("checks")):
-                    tell("note", text=undeclared)
                 say(service.verdict.line())
     except Exception as error:  # noqa: BLE001  (it is logged)
         if isinstance(error, MemoryTakenError):

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from fractions import Fraction
 from typing import Any, Literal, NamedTuple
 
@@ -88,20 +87,6 @@ class Verdict:
             numbers = {key: v if isinstance(v, str) else _number(v) for key, v in self.evidence.items()}
             message["evidence"] = numbers
         return json.dumps(message, allow_nan=False)
-
-
-def undeclared_checks(verdict: Verdict, declared: Mapping[str, str] | None) -> str:
-    """What is wrong where the manifest's ``checks`` lack some of a verdict's; empty if they lack none, or are none.
-
-    The verdict counts all the same: only goals of tests cannot name such a check.
-    """
-    patterns = tuple(declared or ())
-    names = [c.name for c in verdict.checks if not any(fnmatchcase(c.name, pattern) for pattern in patterns)]
-    if not patterns or not names:
-        return ""
-    what = f"check '{names[0]}' is" if len(names) == 1 else f"checks {', '.join(map(repr, names))} are"
-    it = "it" if len(names) == 1 else "them"
-    return f"{what} not among the 'checks' of its service.yml ({', '.join(patterns)}), so no goal can name {it}"
 
 
 def _number(value: float | None) -> float | None:

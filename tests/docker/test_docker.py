@@ -1,12 +1,9 @@
 """The same tests in containers of a real engine: isolated from each other, and gone afterwards."""
 
 import contextlib
-import grp
 import json
 import os
 import re
-import shutil
-import stat
 import subprocess
 import sys
 import threading
@@ -15,7 +12,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import yaml
 
 from dodo_dsl.outcome import differs_each_run
 from tests.docker.compose import Crate
@@ -168,36 +164,6 @@ def test_the_emulated_rig_in_containers(tmp_path: Path) -> None:
         helper.join()
     assert {test["outcome"] for test in results(report).values()} == {"passed"}
     assert (report / "hil-dynamic" / "snapshot.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_a_rig_s_device_is_open_to_the_service(tmp_path: Path) -> None:
-    """As a serial port is on Debian: for its group alone."""
-    device = Path(f"/dev/dodo-test-{os.getpid()}")
-    for name in ("tests_registry", "examples"):
-        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
-    deployment = yaml.safe_load((ROOT / "dodo.yml").read_text())
-    deployment["rigs"] = {
-        "bench": {"kind": "dynamic", "cid": 120, "serial": str(device), "camera": {"source": "rpicam"}}
-    }
-    (tmp_path / "dodo.yml").write_text(yaml.safe_dump(deployment))
-    spec = tmp_path / "tests_registry" / "hil-dynamic" / "hil-dynamic.dodo.yml"
-    spec.write_text(spec.read_text().replace("rig: emulated", "rig: bench"))
-    subprocess.run([sys.executable, "-m", "dodo_dsl", "compile", str(spec)], cwd=tmp_path, check=True)
-    try:
-        os.mknod(device, stat.S_IFCHR, os.makedev(1, 3))
-    except PermissionError:
-        pytest.skip("this user may not make device files")
-    folder = tmp_path / "generated" / "hil-dynamic"
-    command = ["docker", "compose", "run", "--rm", "--no-deps", "--entrypoint", "sh", "pose"]
-    words = [*command, "-c", f"test -w {device} && id -u"]
-    try:
-        os.chown(device, 0, grp.getgrnam("dialout").gr_gid)
-        device.chmod(0o660)
-        result = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
-    finally:
-        device.unlink()
-        subprocess.run(["docker", "compose", "down", "-v"], cwd=folder, capture_output=True, check=False)
-    assert (result.stdout.strip(), result.returncode) == ("10001", 0), result.stderr
 
 
 def test_compiled_test_runs_by_hand(tmp_path: Path) -> None:

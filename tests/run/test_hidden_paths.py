@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -32,21 +31,6 @@ def test_what_the_plan_names_and_outputs_and_history(tmp_path: Path) -> None:
 def test_the_whole_report_is_hidden_also_while_the_next_one_is_written(tmp_path: Path, report: str) -> None:
     test, path = made(tmp_path, "t", report)
     assert hidden_paths(Application("..", ()), test, path) == [test, tmp_path / "dodo-report"]
-
-
-def test_outputs_elsewhere_are_hidden_alone(tmp_path: Path) -> None:
-    """There, an application may have what dodo.yml names."""
-    _, test, report = made(tmp_path, "team/.git", "out/t", "reports/t")
-    assert hidden_paths(Application("../../team", ()), test, report) == [test, report, tmp_path / "team" / ".git"]
-
-
-def test_files_that_tests_share_are_hidden_with_the_tests(tmp_path: Path) -> None:
-    """Also where the tests are compiled into the application's own folder."""
-    dil, shared, *_ = made(tmp_path, "dil-a", "_files", "out/dil-a", "out/_files")
-    application, elsewhere = Application("..", ()), tmp_path.parent / "report"
-    assert hidden_paths(application, dil, elsewhere) == [dil, shared]
-    other = replace(application, folder="../..")
-    assert hidden_paths(other, tmp_path / "out/dil-a", elsewhere) == [tmp_path / "out"]
 
 
 def test_own_state_and_caches_in_the_repository_are_hidden(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

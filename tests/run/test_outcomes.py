@@ -5,25 +5,18 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.plan.model import Application, ApplicationService, Flag, PlannedService
+from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.run.outcomes import (
     Facts,
     Finding,
     decide,
     error_reason,
     how_it_ended,
-    lost_messages,
     unstartable,
     windowless,
-    worst,
 )
 from dodo_dsl.run.protocol import VerdictEvent
 from tests.run.scripted import plan
-
-
-def test_nothing_is_an_error() -> None:
-    assert worst([]) == "error"
-    assert decide(Facts(("track",))) == Finding("error", "no evaluator gave a verdict")
 
 
 def verdict(name: str, passed: bool) -> VerdictEvent:
@@ -56,22 +49,6 @@ def test_verdicts_are_findings() -> None:
 )
 def test_exit_codes_in_words(code: int, words: str) -> None:
     assert how_it_ended(code) == words
-
-
-PLAIN = PlannedService("environment", "a", "x", "x", ())
-
-
-@pytest.mark.parametrize(
-    ("service", "meaning"),
-    [
-        (PLAIN, "it worked without them"),
-        (replace(PLAIN, flags=(Flag("rec", "test.rec", "report"),)), "the recording is incomplete"),
-        (replace(PLAIN, judge=True), "its verdict does not consider them"),
-    ],
-    ids=["other", "recorder", "evaluator"],
-)
-def test_what_losses_mean(service: PlannedService, meaning: str) -> None:
-    assert lost_messages(service, 2) == f"service 'a' lost 2 messages, because its receive buffer was full: {meaning}"
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ from docker.errors import APIError
 
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker import container_use
-from dodo_dsl.run.docker.beside_processes import uncovered
 from dodo_dsl.run.docker.container_use import ContainerUse
 from dodo_dsl.run.docker.side import ContainerSide
 from dodo_dsl.run.machine_load.service_use import Used
@@ -156,13 +155,3 @@ def test_the_load_is_measured_where_all_containers_run_here(proc: Proc) -> None:
     assert used(proc, app=Container("c0ffee", 12)) is None
     assert used(proc, app=Container("c0ffee", 10, APIError("gone"))) is None
     assert used(proc) is None
-
-
-@pytest.mark.parametrize("own", [{"Mounts": [{"Destination": "/dev/shm"}]}, {"HostConfig": {"Tmpfs": {"/dev": ""}}}])
-def test_what_is_mounted_over_shared_memory_is_named_where_the_test_needs_it(own: dict[str, Any]) -> None:
-    (hidden,) = [mount["Destination"] for mount in own.get("Mounts", ())] or ["/dev"]
-    container = {"Mounts": [], "HostConfig": {"Tmpfs": None}, **own}
-    assert uncovered(container) == ""
-    container["Mounts"] = [*container["Mounts"], {"Destination": "/dev/shm/folder-of-services"}]
-    assert uncovered(container) == hidden
-    assert uncovered({"Mounts": container["Mounts"][-1:], "HostConfig": {}}) == ""

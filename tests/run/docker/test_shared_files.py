@@ -3,11 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-import pytest
-from docker.errors import APIError, NotFound
+from docker.errors import APIError
 from docker.types import HostConfig
 
-from dodo_dsl.run.docker.shared_files import problem, unseen
+from dodo_dsl.run.docker.shared_files import unseen
 
 
 class Engine:
@@ -39,17 +38,3 @@ def test_the_first_path_that_is_missing(tmp_path: Path) -> None:
     assert unseen(engine, [tmp_path / "a", tmp_path / "b"]) is None
     assert engine.containers == []
     assert unseen(engine, [tmp_path / "a", Path("/team/app"), Path("/team/app/maps")]) == Path("/team/app")
-
-
-@pytest.mark.parametrize("error", [NotFound("no such image"), OSError("gone"), APIError("500", explanation="full")])
-def test_what_says_nothing_of_files_is_no_answer(error: Exception, tmp_path: Path) -> None:
-    assert unseen(Engine(error=error), [tmp_path]) is None
-
-
-def test_the_way_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
-    monkeypatch.setenv("DOCKER_HOST", "tcp://docker:2375")
-    said, way = problem(tmp_path / "dodo-run-1" / "t" / "test.json")
-    assert said.startswith("the Docker engine at tcp://docker:2375 does not see '")
-    assert "TMPDIR" in way
-    assert "TMPDIR" not in problem(Path("/team/app"))[1]

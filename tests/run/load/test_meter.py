@@ -127,14 +127,6 @@ def test_growth(sizes: list[float], expected: float) -> None:
     assert found == (pytest.approx(expected, rel=0.02) if isinstance(expected, float) else expected)
 
 
-@pytest.mark.parametrize(("step", "expected"), [(6, None), (5, pytest.approx(5 * MB, rel=0.1))])
-def test_between_two_times_of_a_clock_in_steps_nobody_knows(step: int, expected: float | None) -> None:
-    """As in lockstep, where ten pictures pass in a quarter of a second: a step then stands still for two."""
-    points = [(n // step * step / 10, 100 * MB + 0.5 * MB * n) for n in range(60)]
-    assert growth(points, in_steps=True) == expected
-    assert growth(points) == pytest.approx(5 * MB, rel=0.1)
-
-
 def test_figures_are_by_the_test_s_own_time() -> None:
     """Ten times as fast as the wall: half of a processor by its time is a twentieth by the test's."""
     sizes = [900 * MB if n == 777 else 100 * MB + 10 * MB * 0.002 * n for n in range(5000)]

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.machine_load.processes import memory
-from dodo_dsl.run.machine_load.service_use import Snapshot, UseReader, busy_s
+from dodo_dsl.run.machine_load.service_use import Snapshot, UseReader
 
 TICK = 1 / os.sysconf("SC_CLK_TCK")
 MB = 1 << 20
@@ -130,22 +129,3 @@ def test_what_processes_share_counts_once(proc: Proc) -> None:
 
 
 STAT = "cpu  9 9\ncpu0 100 20 300 9999 9999 4 5 60 8888 7777\ncpu1 1 1 1 9999 9999 1 1 1 0 0\ncpu10 7 7 7\nintr 5\n"
-
-
-def test_cores_are_busy_with_whatever_keeps_others_off(proc: Proc) -> None:
-    """Neither idle nor waiting for disks; guests are in the user's time already."""
-    assert busy_s(STAT, [0]) == pytest.approx(489 * TICK)
-    assert busy_s(STAT, [0, 1]) == pytest.approx(495 * TICK)
-    assert (busy_s(STAT, [0, 2]), busy_s(STAT, [10]), busy_s("", [])) == (None, None, 0)
-    (proc.root / "self" / "schedstat").unlink()
-    assert proc.used().busy_s is None, "a kernel that does not count who waits"
-
-
-def test_what_only_a_descriptor_holds_counts_once() -> None:
-    """By the kernel's own figures; what busy programs and forks use is in tests/run/process/test_resources.py."""
-    before, file = memory([os.getpid()], []), os.memfd_create("x")
-    copy = os.dup(file)
-    os.write(file, bytes(64 << 20))
-    assert 50 < (memory([os.getpid()], []) - before) / MB < 100
-    os.close(file)
-    os.close(copy)

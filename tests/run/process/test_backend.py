@@ -4,7 +4,6 @@ What becomes of a test whatever its processes do is tested without them, in ``te
 """
 
 import os
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,42 +40,6 @@ def test_what_application_and_services_used_is_measured(bench: Bench) -> None:
     assert (outcome.outcome, load.cores) == ("passed", len(os.sched_getaffinity(0)))
     assert (load.application.longest, load.services.longest in ("camera", "judge")) == ("app", True)
     assert load.application.ran_s > 0.2 > load.services.ran_s > 0.0
-
-
-GONE = """#!/bin/sh
-case "$*" in *" -- true") exec {program} "$@";; esac
-echo x >> {count}
-if [ $(wc -l < {count}) -le {most} ]; then
-    echo 'bwrap: Can'"'"'t bind mount /oldroot/ on /newroot/: Unable to apply mount flags: {why}'
-    exit 1
-fi
-exec {program} "$@"
-"""
-
-
-@pytest.mark.parametrize(("most", "outcome"), [(2, "passed"), (100, "error")])
-def test_mount_that_goes_away_meanwhile(host: Bench, monkeypatch: pytest.MonkeyPatch, most: int, outcome: str) -> None:
-    """As those of ended containers do while bubblewrap copies the host's: the application is started again."""
-    program, count = shutil.which("bwrap"), host.folder / "count"
-    (host.folder / "bin").mkdir()
-    fake = host.folder / "bin" / "bwrap"
-    why = 'remount "/newroot/gone": No such file or directory'
-    fake.write_text(GONE.format(count=count, most=most, program=program, why=why))
-    fake.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{fake.parent}:{os.environ['PATH']}")
-    (result,) = host.run(host.plan(application=STARTED + WAIT, judge=READY + BEGUN + PASS))
-    assert (result.outcome, len(count.read_text().split())) == (outcome, min(most + 1, 10))
-
-
-def test_variables_file_of_an_unknown_user_is_an_error_of_its_test_alone(host: Bench) -> None:
-    broken = host.plan(slug="broken")
-    (app,) = broken.application.services
-    app = replace(app, env_files=("~no-such-user-at-all/own.env",))
-    broken = replace(broken, application=replace(broken.application, services=(app,)))
-    first, second = host.run(broken, host.plan(slug="beside"))
-    told = "env_file of 'app': '~no-such-user-at-all/own.env' is outside the repository"
-    assert (first.outcome, second.outcome) == ("error", "passed")
-    assert first.reason == f"service 'app' could not be started: {told}"
 
 
 JOINS = """

@@ -3,7 +3,6 @@
 import asyncio
 import math
 import random
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -116,14 +115,6 @@ def test_lines_for_a_terminal_are_the_messages_of_plain_ones(desk: Desk) -> None
     assert desk.silence() == "since its last match 'app' printed no line"
     desk.print(b"\x1b[1mgroup_0X;\x1b[m")
     assert desk.silence() == "since its last match no line of 'app' matched, the nearest is 'group_0X;'"
-
-
-def test_without_a_sample_time_it_is_of_now(tmp_path: Path) -> None:
-    desk = Desk(tmp_path, Line("steer (?P<groundSteering>[^ ]+)", STEERING, 3))
-    before = time.time_ns() // 1000
-    ((sampled, stamp, _),) = desk.print(b"steer 1")
-    assert before <= sampled <= time.time_ns() // 1000
-    assert stamp == 3
 
 
 def test_one_line_may_be_several_messages(tmp_path: Path) -> None:

@@ -72,16 +72,6 @@ def test_answers_may_follow_the_input() -> None:
     ]
 
 
-def test_there_is_one_verdict() -> None:
-    evaluator = Spans()
-    evaluator.begin(BEGIN)
-    evaluator.verdict = early = Verdict("failed", "hit a wall")
-    evaluator.update(BEGIN + 11 * SECOND)
-    evaluator.end_of_input(BEGIN + 11 * SECOND)
-    evaluator.time_is_over()
-    assert evaluator.verdict is early and not evaluator.spans and not evaluator.advanced
-
-
 @pytest.mark.parametrize("early", [[], [BEGIN - 9 * SECOND]])
 def test_the_first_begin_is_time_zero_whatever_came_before(early: list[int]) -> None:
     evaluator = Spans()
@@ -90,9 +80,3 @@ def test_the_first_begin_is_time_zero_whatever_came_before(early: list[int]) -> 
     evaluator.begin(BEGIN)
     evaluator.begin(BEGIN + 5 * SECOND)
     assert (evaluator.begun, evaluator.elapsed(BEGIN + SECOND), evaluator.zero) == ([BEGIN], 1.0, BEGIN)
-
-
-def test_without_a_begin_the_first_update_is_time_zero() -> None:
-    evaluator = Spans()
-    evaluator.update(BEGIN)
-    assert (evaluator.elapsed(BEGIN - SECOND), evaluator.begun, evaluator.now) == (-1.0, [], BEGIN)

@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from services.base.service import Check, Verdict, period_of, undeclared_checks
+from services.base.service import Check, Verdict, period_of
 
 
 @pytest.mark.parametrize(("slow", "fast"), [(30.0, 60.0), (15.0, 60.0), (12.0, 24.0), (29.97, 59.94), (0.3, 0.9)])
@@ -35,15 +35,6 @@ def test_no_finite_value_is_null(value: float) -> None:
     assert check == {"name": "x", "value": None, "limit": {"max": 1}, "unit": "", "ok": False}
 
 
-def test_numbers_of_numpy_and_any_text() -> None:
-    reason = 'a "quoted" line\nand an ö'
-    line = Verdict("passed", reason, (Check("x", np.float32(0.5), {"max": np.float64(1)}, "m", np.bool_(True)),)).line()
-    assert "\n" not in line and line.isascii()
-    found = json.loads(line)
-    assert found["reason"] == reason
-    assert found["checks"][0]["value"] == 0.5 and found["checks"][0]["ok"] is True
-
-
 def test_evidence_is_in_the_line_where_there_is_some() -> None:
     evidence = {"time": np.float64(0.5), "sample-time": 1_700_000_000_100_000, "obstacle": "left", "x": math.nan}
     assert json.loads(Verdict("failed", "hit", evidence=evidence).line())["evidence"] == {
@@ -51,12 +42,3 @@ def test_evidence_is_in_the_line_where_there_is_some() -> None:
     }  # fmt: skip
     assert json.loads(Verdict("failed", "hit", silent=True).line())["silent"] is True
     assert not {"evidence", "silent"} & json.loads(Verdict("failed", "hit").line()).keys()
-
-
-def test_checks_that_the_manifest_does_not_declare() -> None:
-    verdict = Verdict("passed", "", tuple(Check(name, 1.0) for name in ("recall", "recall-cone", "largest-step", "x")))
-    where = "the 'checks' of its service.yml (recall, recall-*)"
-    text = f"checks 'largest-step', 'x' are not among {where}, so no goal can name them"
-    assert undeclared_checks(verdict, {"recall": "", "recall-*": ""}) == text
-    assert undeclared_checks(verdict, {"*": ""}) == ""
-    assert undeclared_checks(verdict, None) == ""

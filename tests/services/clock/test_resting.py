@@ -21,7 +21,7 @@ from services.base.lockstep_clock import EPOCH
 from services.clock import resting
 from services.clock.agent import TimeAgent
 from services.clock.answers import filters
-from services.clock.exchange import ApplicationFloods, ApplicationSilent, Patience, ServiceLink, ServiceSilent
+from services.clock.exchange import ApplicationSilent, Patience, ServiceLink, ServiceSilent
 from services.clock.printed_lines import PrintedLines
 from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
 from tests.services.clock.toys import STEER, STEP, Toys
@@ -199,19 +199,6 @@ def test_a_destroyed_page_fails_the_application_and_an_agent_that_ends_does_not(
                 time.report(0.1)
 
 
-def test_a_flood_ends_the_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(resting, "MOST_SENT", 3)
-    sent = SentMessages(filters([f"{STEER}/0"], IDS))
-    for step in range(4):
-        for n in range(3):
-            sent.take(steering(EPOCH + n))
-        sent.collect(EPOCH, EPOCH + step)
-    for n in range(3):
-        sent.take(steering(EPOCH + n))
-    with pytest.raises(ApplicationFloods, match="sent more than 3 GroundSteeringRequests within a step: it floods"):
-        sent.take(steering(EPOCH))
-
-
 def test_what_is_computed_for_each_answer_is_measured(tmp_path: Path) -> None:
     """By the agent; by the wall clock where a process has ended, whose last part is not known."""
     sent = SentMessages(filters([STEER], IDS))
@@ -258,21 +245,6 @@ def test_the_first_picture_of_a_camera_is_shown_when_the_application_waits_for_i
     shows = {EPOCH + resting.EXPOSED_US, EPOCH + STEP + resting.EXPOSED_US}
     assert {*times} == {EPOCH, EPOCH + STEP, EPOCH + 2 * STEP} | shows | after
     assert [service for service, show in link.sent if show.announces] == ["left", "right", "left", "right"]
-
-
-def test_notes_are_told_once_and_services_that_never_loaded_the_clock_are_named(tmp_path: Path) -> None:
-    notes = [{"kind": "static", "service": 0, "name": "busybox"}, {"kind": "odd", "service": 0, "name": "x"}]
-    begun = iter([[0], [0, 1], [0, 1], [0]])
-    with agent(tmp_path, lambda until: [reached(until, notes=notes, services=next(begun), repeatable=False)]) as time:
-        with pytest.raises(ServiceSilent, match="service 'eye' never loaded DoDo's clock"):
-            application(time).start(EPOCH, ())
-        driven = application(time)
-        driven.start(EPOCH, ())
-        driven.await_answer(EPOCH + STEP)
-        driven.show((), EPOCH + STEP)  # once the test has begun, none can say that it has not
-    first, second = driven.notes  # type: ignore[attr-defined]
-    assert first.startswith("not all services began at once")
-    assert second == "service 'driver' started 'busybox', a statically linked program, which keeps the machine's time"
 
 
 def expected(steps: int, every: int) -> list[tuple[int, float]]:

@@ -71,22 +71,6 @@ class Eye(Service):
         return ()
 
 
-class Film(Service):
-    """Shows some numbers, one a step, and ends with the last of them."""
-
-    period = STEP
-
-    def __init__(self, memory: SharedMemory, length: int) -> None:
-        self._memory, self._length, self._number = memory, length, 0
-
-    def update(self, now: int) -> Iterable[Any]:
-        if self._number < self._length:
-            self._number += 1
-            show(self._memory, self._number, now)
-            self.finished = self._number == self._length
-        return ()
-
-
 class ToyEvaluator(Service):
     """Remembers the path and the boxes in pictures, and ends after some seconds or with the input."""
 

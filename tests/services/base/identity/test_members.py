@@ -13,7 +13,7 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import RealTimeClock
 from services.base.loop import Loop
-from services.base.members import VARIABLE, Members, Producers, SenderTable
+from services.base.members import VARIABLE, Members, SenderTable
 from services.base.service import Service
 from tests.services.base.identity.conftest import Join
 
@@ -35,18 +35,6 @@ def admitted(session: Session, members: Members) -> list[bool]:
 
 def send(session: Session, name: str = FRAME, stamp: int = 0) -> None:
     session.send(session.messages.type(name)(), 1, stamp)
-
-
-@pytest.mark.parametrize("first", ["pose", "track"])
-def test_whoever_came_first(enter: Join, first: str, capsys: pytest.CaptureFixture[str]) -> None:
-    services = {name: enter(name) for name in sorted(("pose", "track"), key=lambda name: name != first)}
-    send(services["pose"][0])
-    assert admitted(*services["track"]) == [True]
-    application = enter("stranger", False)[0]
-    send(application)
-    send(application, FRAME, 7)
-    assert admitted(*services["track"]) == [False, True]
-    assert capsys.readouterr().out.count("the application sent opendlv.sim.Frame/0, which only 'pose' may send") == 1
 
 
 def test_a_service_that_does_not_say_its_address_is_believed(enter: Join, capsys: pytest.CaptureFixture[str]) -> None:
@@ -143,15 +131,6 @@ def loaded(monkeypatch: pytest.MonkeyPatch, text: str) -> SenderTable:
 
 def of(name: str, stamp: int) -> Envelope:
     return Envelope(MESSAGES.id(name), b"", 0, 0, 0, stamp)
-
-
-def test_by_message_and_sender_stamp(monkeypatch: pytest.MonkeyPatch) -> None:
-    table = loaded(monkeypatch, "opendlv.sim.Frame/3=pose,way? opendlv.sim.Command=")
-    assert table.producers(of("opendlv.sim.Frame", 3)) == Producers(
-        "opendlv.sim.Frame/3", ("pose", "way"), frozenset(["way"])
-    )
-    assert table.producers(of("opendlv.sim.Frame", 0)) is None
-    assert table.producers(of("opendlv.sim.Command", 99)) == Producers("opendlv.sim.Command")
 
 
 def test_the_runner_is_known_by_its_address(

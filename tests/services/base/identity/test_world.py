@@ -27,16 +27,6 @@ class Teller(Service):
         return [Output(MESSAGES.type(name)(), 0) for name in (FRAME, STATE, READING)]
 
 
-class Relaying(RealTimeClock):
-    """Counts what the clock of a test in lockstep would pass on."""
-
-    relays = True
-    count = 0
-
-    def sent(self, _envelope: Envelope) -> None:
-        self.count += 1
-
-
 @pytest.fixture(autouse=True)
 def world(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(WORLD_VARIABLE, "pose track own?=opendlv.sim.KinematicState/0")
@@ -87,17 +77,6 @@ def test_services_hear_all_and_the_application_what_it_may(
     assert taken(application) == heard
 
 
-@pytest.mark.parametrize("truth", ["", f"{READING}/0"])
-def test_in_lockstep_the_clock_gets_everything(cid: int, monkeypatch: pytest.MonkeyPatch, truth: str) -> None:
-    monkeypatch.setenv(WORLD_VARIABLE, "pose")
-    monkeypatch.setenv(TRUTH, truth)
-    clock = Relaying()
-    with Session(cid) as session, Session(cid) as listener:
-        Loop("pose", Teller(), session, clock, 0).run(lambda: False)
-        assert taken(listener) == ([] if truth else [READING])
-    assert clock.count == 4
-
-
 def test_what_reaches_no_service_of_the_test_does_not_come_to_the_bus(
     application: Session, cid: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -105,15 +84,6 @@ def test_what_reaches_no_service_of_the_test_does_not_come_to_the_bus(
     with Session(cid) as session, pytest.raises(SessionError, match=f"'{FRAME}' must not come to the bus"):
         tell(session, None)
     assert taken(application) == []
-
-
-def test_outside_of_a_test_the_bus_carries_everything(
-    application: Session, cid: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv(WORLD_VARIABLE)
-    with Session(cid) as session:
-        tell(session, None)
-    assert taken(application) == [FRAME, STATE, READING, "dodo.EndOfInput"]
 
 
 def test_a_service_that_does_not_say_where_it_listens_hears_it_on_the_bus(
