@@ -3,15 +3,13 @@
 import argparse
 import math
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any, TextIO
 
-from dodo_dsl.cli import rig_board, rig_measure, rig_truth, selection
+from dodo_dsl.cli import rig_measure, rig_truth, selection
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.cli.numbers import finite, patience
 from dodo_dsl.run.rigs import access, leases
-from dodo_dsl.run.rigs.access import MANUAL, query_exclusively
-from dodo_dsl.run.rigs.permission import STILL, refuse_forbidden
+from dodo_dsl.run.rigs.access import MANUAL
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.spec.deployment import FILE_NAME, Deployment
 from dodo_dsl.spec.rig import EMULATED, EMULATED_RIGS, LIMIT_UNITS, Rig
@@ -53,7 +51,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         wait = "maximum wait for a busy rig, in s (default: 60)"
         action.add_argument("--wait", type=patience, default=60.0, metavar="S", help=wait)
         action.add_argument("--json", action="store_true", help="output as JSON")
-    for name, module in {"board": rig_board, "measure": rig_measure, "truth": rig_truth}.items():
+    for name, module in {"measure": rig_measure, "truth": rig_truth}.items():
         formatter = argparse.RawDescriptionHelpFormatter
         module.add(
             actions.add_parser(
@@ -66,9 +64,6 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     def say(text: str) -> None:
         stderr.write(f"{printable(text)}\n")
 
-    if options.action == "board":
-        stdout.write(rig_board.make(options) + "\n")
-        return Exit.OK
     deployment = selection.checked_deployment()
     chosen = _chosen(options, deployment)
     if options.action == "truth":
@@ -76,7 +71,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         return Exit.OK
     if options.action == "measure":
         return rig_measure.measure(options, deployment, chosen[0], stdout, stderr)
-    results = [_one(options, rig, deployment.root, say) for rig in chosen]
+    results = [_one(options, rig, say) for rig in chosen]
     if options.json:
         stdout.write(json_text(results))
     else:
@@ -99,12 +94,10 @@ def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Rig]:
     return [rig]
 
 
-def _one(options: argparse.Namespace, rig: Rig, root: Path, say: Callable[[str], None]) -> dict[str, Any]:
-    """The result of the action on one rig of the repository at ``root``; a status includes its fault."""
+def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
+    """The result of the action on one rig; a status includes its fault."""
     result: dict[str, Any] = {"rig": rig.name, "kind": rig.kind, "quarantine": ""}
     devices = [text for key in ("serial", "camera.source") if (text := rig.text(key))]
-    if options.action != "status":
-        refuse_forbidden(devices, STILL if options.action == "clear" else access.motion(rig), [root])
     if options.action == "clear":
         leases.clear_quarantine(rig.name, devices)
         return result
@@ -115,8 +108,6 @@ def _one(options: argparse.Namespace, rig: Rig, root: Path, say: Callable[[str],
             raise UsageError(f"rig '{rig.name}' has no serial port, so it cannot move")
         return result
     try:
-        if options.action == "status":
-            refuse_forbidden(devices, STILL, [root])
         return {**result, **_moved(options, rig, say)}
     except RigProblem as problem:
         if options.action != "status":
@@ -127,7 +118,9 @@ def _one(options: argparse.Namespace, rig: Rig, root: Path, say: Callable[[str],
 def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
     place = (options.x, options.y, options.yaw) if options.action == "goto" else ()
     words = [*access.flags(rig), options.action, *(f"{number:g}" for number in place)]
-    return query_exclusively(rig.cid, f"'dodo rig {options.action}'", (MANUAL, words), say, options.wait)
+    user = f"'dodo rig {options.action}'"
+    with access.occupied(rig.cid, user, leases.devices_in(words), say, options.wait) as query:
+        return query((MANUAL, words))
 
 
 def _limits_sentence(limits: Mapping[str, Any]) -> list[str]:

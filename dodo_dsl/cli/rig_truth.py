@@ -13,9 +13,7 @@ from dodo_dsl.cli.numbers import patience
 from dodo_dsl.rec import truth
 from dodo_dsl.rec.truth import Mark, TruthError, TruthFiles, decoded, given
 from dodo_dsl.run.rigs import access
-from dodo_dsl.run.rigs.access import query_exclusively
 from dodo_dsl.run.rigs.leases import devices_in
-from dodo_dsl.run.rigs.permission import STILL, refuse_forbidden
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import of_test
 from dodo_dsl.spec.manifest import Manifest, load_manifests
@@ -31,8 +29,6 @@ EXAMPLES = """examples:
   dodo rig truth kiwi-static -o truths/desk.json --picture truths/desk.png \\
       --box yellow 199 329 36 55 --box blue 440 347 43 67
                                         the truth of that snapshot, with boxes marked manually
-  dodo rig truth kiwi-static -o truths/desk.json --boxes marked.json --force
-                                        a new snapshot, with the boxes of a COCO file
 
 It writes FILE.json (COCO, in pixels), FILE.png (the snapshot) and FILE-boxes.png, which shows the boxes: look at it.
 """
@@ -44,7 +40,6 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--test", metavar="TEST", help="test whose camera is used; required for the emulated rig")
     parser.add_argument("--box", nargs=5, action="append", default=[], metavar=("CLASS", "X", "Y", "WIDTH", "HEIGHT"),
                         help="a box in pixels from the upper left corner; repeatable")  # fmt: skip
-    parser.add_argument("--boxes", metavar="FILE.json", type=Path, help="COCO file with the boxes of one picture")
     parser.add_argument("--classes", metavar="A,B", default="", help="known classes, as MODEL=CLASS for a virtual "
                         "scene (default: those that the test judges, else any)")  # fmt: skip
     parser.add_argument("--picture", metavar="FILE", type=Path, help="picture to use instead of a new snapshot")
@@ -62,14 +57,13 @@ def make(options: argparse.Namespace, deployment: Deployment, rig: Rig, say: Cal
     files = TruthFiles.beside(options.output)
     manifests, spec = _test(options.test, deployment)
     is_new = options.picture is None or options.picture.resolve() != files.picture.resolve()
-    is_scene = rig.is_emulated and not options.box and not options.boxes
-    has_boxes = is_scene or options.box or options.boxes
+    is_scene = rig.is_emulated and not options.box
+    has_boxes = is_scene or options.box
     refuse_existing(files.wanted(bool(has_boxes), is_new), options.force)
     marks = [truth.mark(words[0], words[1:], f"--box {' '.join(words)}") for words in options.box]
-    png, answer = _looked(options, rig, manifests, spec, deployment.root, say)
+    png, answer = _looked(options, rig, manifests, spec, say)
     picture = decoded(png, str(options.picture or rig.name))
     height, width = picture.shape[:2]
-    marks += truth.read(options.boxes, width, height) if options.boxes else []
     marks += [_of_scene(box) for box in answer.get("boxes", ())] if is_scene else []
     classes = [word.partition("=")[2] or word for word in options.classes.split(",") if word]
     classes = classes or (access.judged_classes(rig, manifests, spec) if spec else [])
@@ -98,21 +92,20 @@ def _looked(
     rig: Rig,
     manifests: Mapping[str, Manifest],
     spec: Spec | None,
-    root: Path,
     say: Callable[[str], None],
 ) -> tuple[bytes, dict[str, Any]]:
     """The bytes of the picture, and the answer of the camera's program."""
     if options.picture:
-        if rig.is_emulated and not (options.box or options.boxes):
-            raise TruthError("--picture has no virtual scene: mark its boxes with --box or --boxes")
+        if rig.is_emulated and not options.box:
+            raise TruthError("--picture has no virtual scene: mark its boxes with --box")
         return given(options.picture), {}
     snapshot = access.snapshot(rig, manifests, spec)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "snapshot.png"
         words = [*snapshot.words, f"--output={path}"]
         words += [f"--truth-classes={options.classes}"] if snapshot.is_rendered and "=" in options.classes else []
-        refuse_forbidden(devices_in(words), STILL, [root])
-        answer = query_exclusively(rig.cid, "'dodo rig truth'", (snapshot.program, words), say, options.wait)
+        with access.occupied(rig.cid, "'dodo rig truth'", devices_in(words), say, options.wait) as query:
+            answer = query((snapshot.program, words))
         if answer.get("reason"):
             say(f"warning: {answer['reason']}")
         return path.read_bytes(), answer

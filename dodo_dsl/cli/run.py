@@ -235,14 +235,8 @@ def _backends(
         raise UsageError(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
     return CombinedBackends(
         backend, deployment.cids, subnets(deployment.subnets), options.isolation, (load.descriptor,),
-        _roots(options, deployment), load.take,
+        load.take,
     )  # fmt: skip
-
-
-def _roots(options: argparse.Namespace, deployment: Deployment) -> list[Path]:
-    """The folders that the tests come from: the deployment's, and those of the command line."""
-    named = options.compiled or [Path(word) for word in options.test if Path(word).exists()]
-    return [deployment.root, *named]
 
 
 def run(

@@ -72,7 +72,7 @@ class SearchSession:
         deployment, options, rigs = study.checked.deployment, self.options, RigSession()
         backends = CombinedBackends(
             options.backend, deployment.cids, isolation=options.isolation, descriptors=(self.load.descriptor,),
-            roots=[deployment.root], loaded=self.load.take, session=rigs,
+            loaded=self.load.take, session=rigs,
         )  # fmt: skip
         return DriveHost(KeptBackends(backends), schedule(options.jobs, expectation(backends.name)), self.work, rigs)
 

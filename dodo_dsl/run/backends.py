@@ -15,7 +15,7 @@ from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.processes import Processes
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError, Say
-from dodo_dsl.run.rigs.permission import refuse_unattended
+from dodo_dsl.run.rigs.ports import refuse_unattended
 from dodo_dsl.run.rigs.session import RigSession, attended
 from dodo_dsl.run.sides import Backend, Side, WatchedServices
 from dodo_dsl.run.work_folder import meeting_place
@@ -75,9 +75,8 @@ class CombinedBackends:
     """The backends of a combination, by its ``name``.
 
     On the host, processes take one of the ``cids``; ``subnets`` are for networks of containers. ``isolation`` is in
-    place of the tests' own. ``roots`` are the folders that tests come from, for the permission to use a rig. A
-    ``session`` spares rigs that stay fit their checks between tests. ``loaded`` gives a fork server that was started
-    with the same ``descriptors`` while tests were compiled.
+    place of the tests' own. A ``session`` spares rigs that stay fit their checks between tests. ``loaded`` gives a fork
+    server that was started with the same ``descriptors`` while tests were compiled.
     """
 
     name: str
@@ -85,7 +84,6 @@ class CombinedBackends:
     subnets: Sequence[str] = ()
     isolation: str | None = None
     descriptors: tuple[int, ...] = ()
-    roots: Sequence[Path] = ()
     loaded: Callable[[], ForkServer | None] = lambda: None
     session: RigSession | None = None
     _kinds: "list[Processes | Containers]" = field(default_factory=list)
@@ -140,6 +138,6 @@ class CombinedBackends:
         async with (
             self._alone if alone else contextlib.nullcontext(),
             host_isolation.host_slot(plan, cids, say, keep, alone=alone) as leased,
-            attended(plan, replace(leased, channel=channel), say, self.roots, self.session) as descriptors,
+            attended(plan, replace(leased, channel=channel), say, self.session) as descriptors,
         ):
             yield replace(leased, descriptors=(*descriptors, *self.descriptors), channel=channel)

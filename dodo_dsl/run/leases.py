@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.run.protocol import BackendError
-from dodo_dsl.spec.machine import machine
-from dodo_dsl.state_folder import secured
+from dodo_dsl.state_folder import secured, shared_path
 
 FOLDER_VARIABLE = "DODO_LEASES"
 DEFAULT_PATIENCE_S = 600.0
@@ -59,10 +58,10 @@ class Lease:
 def lease_folder() -> Path:
     """This user's lease folder, into which no other user can write; raises OSError if one can.
 
-    It is the one that the machine's operator named for its rigs, else the one in ``DODO_LEASES``.
+    It is the one that root made for all users, else the one in ``DODO_LEASES``.
     """
-    if (operators := machine()) is not None and operators.leases is not None:
-        return secured(operators.leases)
+    if (shared := shared_path("leases")) is not None:
+        return secured(shared)
     if wanted := os.environ.get(FOLDER_VARIABLE):
         return secured(Path(wanted))
     own = f"dodo-{os.geteuid()}"

@@ -1,4 +1,4 @@
-/* Made of firmware/protocol.yml by scripts/make-protocol: change it there.
+/* The serial protocol and the rig in numbers; services/gantry/rig_table.py has the same, and the tests compare them.
  * micro is 1e-6 m, or 1e-6 rad for the yaw; step is a microstep of the drivers. */
 #ifndef PROTOCOL_H
 #define PROTOCOL_H
@@ -6,10 +6,10 @@
 #include <stdint.h>
 
 #define BAUD 115200UL
-#define LINE_LONGEST 64
+#define LINE_LONGEST 64 /* without the line's end; the longest valid line, SETLIMITS, has 61 */
 #define WATCHDOG_MS 500
-#define HOMING_PHASE_MS 30000UL
-#define TICK_MS 2
+#define HOMING_PHASE_MS 30000UL /* the longest way to a switch takes 19 s */
+#define TICK_MS 2 /* between two looks at the drivers */
 #define MICROSTEPS 128
 #define STEP_MODE_REGISTER 7
 
@@ -25,14 +25,14 @@ enum motor { MOTOR_X, MOTOR_Y1, MOTOR_Y2, MOTOR_ALPHA, MOTORS };
 enum axis { AXIS_X, AXIS_Y, AXIS_YAW, AXES };
 #define MOTOR_NAMES {"x", "y1", "y2", "alpha"}
 #define MOTOR_AXES {AXIS_X, AXIS_Y, AXIS_Y, AXIS_YAW}
-#define DRIVER_CONFIG_FIRST 0x2E8B
-#define DRIVER_CONFIG_OTHERS 0x2E8D
+#define DRIVER_CONFIG_FIRST 0x2E8B /* internal 16 MHz clock, given on to the next; a closing switch stops hard */
+#define DRIVER_CONFIG_OTHERS 0x2E8D /* clock of the driver before, given on */
 #define DRIVER_KVAL_HOLD 0x20
-#define DRIVER_KVAL_RUN 0x3C
+#define DRIVER_KVAL_RUN 0x3C /* 2.8 V of 12 V */
 #define DRIVER_KVAL_RAMP 0x3C
-#define DRIVER_OCD_TH 0x8
-#define DRIVER_STALL_TH 0x40
-#define DRIVER_MARK 0xD0D0
+#define DRIVER_OCD_TH 0x8 /* 3.4 A */
+#define DRIVER_STALL_TH 0x40 /* 2 A */
+#define DRIVER_MARK 0xD0D0 /* in MARK while the position is valid, and gone when a driver was without power */
 
 struct axis_constants {
     int64_t steps_q32; /* microsteps per micro, times 2^32 */
@@ -54,6 +54,7 @@ struct axis_constants {
 
 enum kind { KIND_DYNAMIC, KIND_CIRCLE, KINDS };
 
+/* By Table 4.2, the workspace, and what tests/firmware/test_protocol.py names. */
 #define AXIS_ROWS_DYNAMIC { \
     {1825189302LL, 10106756627LL, 956924849LL, 382464L, -900000L, 950000L, 1000000L, 90L, 217L, 114L, 22280L, 22L, 1275L, 4250L, 425L}, \
     {1825189302LL, 10106756627LL, 956924849LL, 297472L, -700000L, 700000L, 1000000L, 90L, 217L, 114L, 22280L, 22L, 1275L, 4250L, 425L}, \
@@ -69,11 +70,12 @@ enum kind { KIND_DYNAMIC, KIND_CIRCLE, KINDS };
 #define TURN 25600L /* microsteps of a circle's turn */
 #define INDEX_WIDTH 711L /* microsteps below step 0 in which its index is closed */
 #define INDEX_TOLERANCE 213L /* microsteps by which it may be elsewhere */
-#define DRIVER_CONFIG_INDEX 0x2E9D
+#define DRIVER_CONFIG_INDEX 0x2E9D /* of a circle's alpha: as the others, and its switch stops nothing */
+
+#define KIND_ANSWER "$CIRCLE:25600"
 
 #ifdef CIRCLE
 #define RIG_KIND KIND_CIRCLE
-#define KIND_ANSWER "$CIRCLE:25600"
 #define AXIS_ROWS AXIS_ROWS_CIRCLE
 #define LIMITS_NARROWEST {100000L, 100000L, 6283185L, 100000L, 500000L, 100000L, 500000L} /* micro */
 #define LIMITS_WIDEST {1850000L, 1400000L, 6283185L, 1000000L, 1000000L, 500000L, 1000000L} /* micro */
@@ -81,7 +83,6 @@ enum kind { KIND_DYNAMIC, KIND_CIRCLE, KINDS };
 #define COMMAND_ROWS {{"GOTO", 3}, {"RUN", 3}, {"STOP", 0}, {"CALIBRATE", 0}, {"POSITION", 0}, {"STATUS", 0}, {"LIMITS", 0}, {"SETLIMITS", 7}, {"FORGET", 0}, {"GOTOLEFT", 3}, {"GOTORIGHT", 3}, {"KIND", 0}}
 #else
 #define RIG_KIND KIND_DYNAMIC
-#define KIND_ANSWER "$CIRCLE:25600"
 #define AXIS_ROWS AXIS_ROWS_DYNAMIC
 #define LIMITS_NARROWEST {100000L, 100000L, 174533L, 100000L, 500000L, 100000L, 500000L} /* micro */
 #define LIMITS_WIDEST {1850000L, 1400000L, 2967059L, 1000000L, 1000000L, 500000L, 1000000L} /* micro */

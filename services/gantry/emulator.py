@@ -3,7 +3,6 @@
 import contextlib
 import json
 import os
-import shlex
 import subprocess
 import threading
 import time
@@ -139,15 +138,9 @@ def _folder(firmware: str) -> Path:
     for folder in (Path(named),) if named else PLACES:
         if (folder / "rig-emulator").is_file() and (folder / firmware).is_file():
             return folder
-    raise PortError(f"the emulated rig is not built: {_way(named)}")
-
-
-def _way(named: str | None) -> str:
-    """How to build it, where this program runs."""
-    if named:
-        return f"{FOLDER} is {named}: build it there, or unset {FOLDER}"
-    checkout = PLACES[0].parents[1]
-    if (checkout / "firmware" / "Makefile").is_file():
-        return f"make -C {shlex.quote(str(checkout))} firmware"
-    then = f"export {FOLDER}=CHECKOUT/build/firmware, or for containers 'dodo images build gantry'"
-    return f"'make firmware' in a checkout of DoDo, then {then}"
+    way = (
+        f"build it in {FOLDER}, which is {named}"
+        if named
+        else f"'make firmware' in a checkout of DoDo, or set {FOLDER}"
+    )
+    raise PortError(f"the emulated rig is not built: {way}")

@@ -3,13 +3,9 @@
 import contextlib
 import errno
 import fcntl
-import grp
 import logging
 import os
-import pwd
-import re
 import select
-import shlex
 import termios
 import time
 from collections.abc import Callable, Iterator
@@ -19,10 +15,10 @@ from typing import NamedTuple, Protocol
 import serial
 
 from services.gantry.motion import Conversion
-from services.gantry.protocol import BAUD, LATCHED, Circle, Limits, LineReader, Position, Refusal, Status, Word, command
+from services.gantry.protocol import LATCHED, Limits, LineReader, Position, Refusal, Word, command
+from services.gantry.rig_table import BAUD, Status
 
 WRITE_PATIENCE = 0.2
-_SOCKET = re.compile(r"socket://(127\.0\.0\.1|localhost|\[::1\]):[0-9]{1,5}")
 
 
 class PortError(ValueError):
@@ -49,17 +45,14 @@ class SerialPort:
     """A port of pyserial that never waits longer than requested."""
 
     def __init__(self, target: str) -> None:
-        """``target`` is a device, or a socket of this machine; raises OSError when it cannot be opened."""
-        exclusive = None if _SOCKET.fullmatch(target) else True
+        """Raises OSError when the device cannot be opened."""
         try:
-            self._port = serial.serial_for_url(
-                target, BAUD, timeout=0, write_timeout=WRITE_PATIENCE, exclusive=exclusive
-            )
+            self._port = serial.Serial(target, BAUD, timeout=0, write_timeout=WRITE_PATIENCE, exclusive=True)
         except termios.error as error:
             raise OSError(f"{target} is not a serial port: {error.args[-1]}") from None
         except serial.SerialException as error:
             if error.errno == errno.EACCES:
-                raise OSError(_refusal(Path(target).stat())) from None
+                raise OSError(f"only root and the group '{Path(target).group()}' may open it") from None
             raise
         _keep(target, self._port)
 
@@ -79,14 +72,7 @@ class SerialPort:
 
 
 def checked(target: str) -> str:
-    """A target that may be opened: a device, or a socket of this machine; raises PortError.
-
-    Other URLs of pyserial are refused, because some of them write files or listen.
-    """
-    if "://" in target:
-        if _SOCKET.fullmatch(target):
-            return target
-        raise PortError(f"'{target}' is not a port of the rig, expected a device or socket://127.0.0.1:PORT")
+    """A target that is a device; raises PortError."""
     if not target.startswith("/") or not os.path.realpath(target).startswith("/dev/"):
         raise PortError(f"'{target}' is not a device, expected one such as /dev/ttyACM0")
     if not Path(target).is_char_device():
@@ -103,27 +89,11 @@ def _as_os_errors() -> Iterator[None]:
         raise OSError(f"the port is gone: {error}") from None
 
 
-def _refusal(device: os.stat_result) -> str:
-    """Why a device is not opened, and how this user gets into the group that may, if there is one besides root's."""
-    said = "this user may not open it"
-    if device.st_mode & 0o060 != 0o060 or device.st_gid == 0:
-        return said
-    try:
-        group, user = grp.getgrgid(device.st_gid), pwd.getpwuid(os.getuid()).pw_name
-    except KeyError:
-        return said
-    if user in group.gr_mem:
-        return f"{said}, because its session is older than its place in the group '{group.gr_name}': log in again"
-    return f"{said}: sudo {shlex.join(['usermod', '--append', '--groups', group.gr_name, user])}, and log in again"
-
-
 def _keep(target: str, port: serial.SerialBase) -> None:
     """Nobody else can open the device, not even from a container, where pyserial's lock on the file has no effect.
 
     DTR stays up when the port is closed: its fall and rise would reset the Arduino.
     """
-    if _SOCKET.fullmatch(target):
-        return
     try:
         fcntl.ioctl(port.fileno(), termios.TIOCEXCL)
         attributes = termios.tcgetattr(port.fileno())
@@ -154,7 +124,6 @@ class LinkAnswers(NamedTuple):
     at: Position | None = None
     status: Status | None = None
     refusals: tuple[Refusal, ...] = ()
-    circle: Circle | None = None
     limits: Limits | None = None
 
 
@@ -225,7 +194,7 @@ class Link:
         _log.warning("the rig at %s did not confirm that it stopped: %s", self.name, reason)
 
     def _answers(self, port: SerialLine, patience: float) -> LinkAnswers:
-        at, status, circle, limits, refusals = None, None, None, None, []
+        at, status, limits, refusals = None, None, None, []
         end = self._now() + patience
         while status is None and (left := end - self._now()) > 0:
             for answer in self._lines.feed(port.read(left)):
@@ -234,13 +203,11 @@ class Link:
                     at = self.conversion.to_true(answer)
                 elif isinstance(answer, Status):
                     status = self._status = answer
-                elif isinstance(answer, Circle):
-                    circle = answer
                 elif isinstance(answer, Limits):
                     limits = answer
                 else:
                     refusals.append(answer)
-        return LinkAnswers(at, status, tuple(refusals), circle, limits)
+        return LinkAnswers(at, status, tuple(refusals), limits)
 
     def _opened(self) -> bool:
         now = self._now()

@@ -12,7 +12,7 @@ import math
 import statistics
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -25,9 +25,10 @@ from services.base.process import interruptible, stop_without_master
 from services.gantry import memory, start
 from services.gantry.emulator import EmulatedRig
 from services.gantry.link import REQUEST_STATE, Link, RigError, SerialPort, checked
-from services.gantry.memory import conversion_of, is_circle, kept_limits, true_box
-from services.gantry.motion import BUILT_IN, Conversion, MotionLimits
-from services.gantry.protocol import Position, Status, Word
+from services.gantry.memory import conversion_of, kept_limits, true_box
+from services.gantry.motion import Conversion, MotionLimits
+from services.gantry.protocol import Position, Word
+from services.gantry.rig_table import Status
 from services.gantry.service import EMULATED, describe, place
 
 ROUNDS = 20
@@ -53,8 +54,6 @@ BESIDE = 0.5
 """rad beside the index, from where a turn begins and ends."""
 _POLL = 0.005
 
-Check = dict[str, Any]
-
 
 def find_home(limits: MotionLimits, conversion: Conversion) -> Position:
     """The true place at the switches, as far as the limits reach, that the line's decimals do not round outside."""
@@ -78,68 +77,36 @@ def read_state(link: Link) -> tuple[Position | None, Status]:
     raise RigError(f"the rig at {link.name} does not report its position")
 
 
-def run_checks(link: Link, limits: MotionLimits, kept: Mapping[str, float], patience: float) -> dict[str, Any]:
-    """``ok``, the ``reason`` when it is not, and the ``checks``; the rig moves, and ends at home.
+def run_checks(link: Link, limits: MotionLimits, kept: Mapping[str, float], patience: float) -> None:
+    """The rig moves, and ends at home; its memory gets the limits ``kept``. Raises RigError, why it is unfit.
 
-    A rig that cannot move, or still reports an old fault, is not fit. Its memory gets the limits ``kept``.
+    A rig that cannot move, or still reports an old fault, is not fit.
     """
-    checks: list[Check] = []
-    try:
-        status = start.find(link)
-        start.check_kind(link, _endless(limits))
-        start.settle(link, status)
-        memory.agree(link, kept, write=True)
-        start.calibrate(link, patience)
-        checks += _answers(link)
-        if all(check["ok"] for check in checks):
-            checks += _homing(link, limits, patience)
-            if _endless(limits):
-                _turn_around(link, limits, patience)
-    except RigError as error:
-        return {"ok": False, "reason": str(error), "checks": checks}
-    bad = [check for check in checks if not check["ok"]]
-    return {"ok": not bad, "reason": _reason(bad[0]) if bad else "", "checks": checks}
+    status = start.find(link)
+    memory.read_memory(link)
+    start.settle(link, status)
+    memory.agree(link, kept, write=True)
+    start.calibrate(link, patience)
+    _check_answers(link)
+    for axis, unit, scale in (("x", "mm", 1000.0), ("y", "mm", 1000.0), ("yaw", "deg", math.degrees(1))):
+        off = min(_differences(link, limits, axis, patience))
+        if off > REPEATS[axis]:
+            raise RigError(f"homing {axis} is {scale * off:.3g} {unit}, expected at most {scale * REPEATS[axis]:g}")
+    if _endless(limits):
+        _turn_around(link, limits, patience)
 
 
-def _reason(check: Check) -> str:
-    (kind, bound), *_ = check["limit"].items()
-    than = "at most" if kind == "max" else "at least"
-    return f"{check['name']} is {check['value']:g} {check['unit']}, expected {than} {bound:g}".replace("  ", " ")
-
-
-def _check(name: str, value: float, unit: str, **limit: float) -> Check:
-    ok = limit.get("min", -math.inf) <= value <= limit.get("max", math.inf)
-    return {"name": name, "value": round(value, 3), "limit": limit, "unit": unit, "ok": ok}
-
-
-def _answers(link: Link) -> list[Check]:
+def _check_answers(link: Link) -> None:
     took = []
     for _ in range(ROUNDS):
         begin = time.monotonic()
         at, status, *_ = link.exchange(REQUEST_STATE, ANSWER)
         if at is not None and status is not None:
             took.append(time.monotonic() - begin)
-    middle = statistics.median(took) if took else ANSWER
-    return [
-        _check("answers", len(took), f"of {ROUNDS}", min=ROUNDS),
-        _check("latency", 1000 * middle, "ms", max=1000 * LATENCY),
-    ]
-
-
-def _homing(link: Link, limits: MotionLimits, patience: float) -> list[Check]:
-    """Homes from two places of each axis: the times differ by the distance between them, unless home has moved.
-
-    Positions mean nothing while homing, and agree with themselves afterwards whatever steps were lost.
-    """
-    checks = []
-    for axis, unit in (("x", "mm"), ("y", "mm"), ("yaw", "deg")):
-        scale = math.degrees(1) if unit == "deg" else 1000
-        off = math.inf
-        for _ in range(TRIES):
-            if off > REPEATS[axis]:
-                off = min(off, _difference(link, limits, axis, patience))
-        checks.append(_check(f"homing {axis}", scale * off, unit, max=scale * REPEATS[axis]))
-    return checks
+    if len(took) < ROUNDS:
+        raise RigError(f"answers is {len(took)} of {ROUNDS}, expected at least {ROUNDS}")
+    if (middle := statistics.median(took)) > LATENCY:
+        raise RigError(f"latency is {1000 * middle:.3g} ms, expected at most {1000 * LATENCY:g}")
 
 
 def _turn_around(link: Link, limits: MotionLimits, patience: float) -> None:
@@ -150,30 +117,27 @@ def _turn_around(link: Link, limits: MotionLimits, patience: float) -> None:
         start.go(link, replace(at, yaw=at.yaw + side * BESIDE), patience, word)
 
 
-def _difference(link: Link, limits: MotionLimits, axis: str, patience: float) -> float:
-    """By how much an axis' switch seems to have moved the second time (m or rad)."""
+def _differences(link: Link, limits: MotionLimits, axis: str, patience: float) -> Iterator[float]:
+    """By how much an axis' switch seems to have moved the second time (m or rad), until that is little enough.
+
+    Homes from two places: the times differ by the distance between them, unless home has moved. Positions mean nothing
+    while homing, and agree with themselves afterwards whatever steps were lost.
+    """
     low: float = _index(link.conversion) if axis == "yaw" and _endless(limits) else getattr(limits.low, axis)
     high: float = getattr(limits.high, axis)
     distance = min((CIRCLE_DISTANCES if _endless(limits) else DISTANCES)[axis], (high - low) / 2)
-    took = []
-    for times in (1, 2):
-        start.go(link, replace(find_home(limits, link.conversion), **{axis: low + times * distance}), patience)
-        took.append(start.calibrate(link, patience, _POLL))
-    return abs((took[1] - took[0]) * SPEEDS[axis] * link.conversion.scale[axis] - distance)
+    for _ in range(TRIES):
+        took = []
+        for times in (1, 2):
+            start.go(link, replace(find_home(limits, link.conversion), **{axis: low + times * distance}), patience)
+            took.append(start.calibrate(link, patience, _POLL))
+        yield (off := abs((took[1] - took[0]) * SPEEDS[axis] * link.conversion.scale[axis] - distance))
+        if off <= REPEATS[axis]:
+            return
 
 
 ACTIONS = {"status": 0, "home": 0, "goto": 3, "calibrate": 0, "check": 0}
 """How many numbers each takes."""
-FLAGS = (
-    "serial",
-    "kind",
-    "patience",
-    "limits",
-    "range-x",
-    "range-y",
-    "range-yaw",
-    *(f"{what}-{axis}" for what in ("steps", "offset") for axis in BUILT_IN),
-)
 DONE, BROKEN, USAGE = 0, 1, 2
 
 
@@ -200,11 +164,11 @@ def main(argv: Sequence[str], stdout: TextIO) -> int:
 
 
 def _parsed(argv: Sequence[str]) -> tuple[Flags, str, list[float]]:
-    about = load_manifest(Path(__file__).parent)["parameters"]
-    manifest = {"name": "gantry", "parameters": {name: about[name] for name in FLAGS}}
     words = [word for word in argv if not word.startswith("--")]
     try:
-        flags = parse(manifest, [*(word for word in argv if word.startswith("--")), "--cid=1"])
+        flags = parse(
+            load_manifest(Path(__file__).parent), [*(word for word in argv if word.startswith("--")), "--cid=1"]
+        )
         action, numbers = words[0] if words else "", [number(word) for word in words[1:]]
     except ValueError as error:
         raise ManualUsageError(str(error)) from None
@@ -251,10 +215,13 @@ def _done(
         link = Link(target, lambda: SerialPort(target), conversion=conversion_of(flags))
         resources.callback(link.close)
         if action == "check":
-            health = run_checks(link, limits, kept, patience)
-            return {**health, **(_where(link, limits) if health["ok"] else {})}, DONE if health["ok"] else BROKEN
+            try:
+                run_checks(link, limits, kept, patience)
+            except RigError as error:
+                return {"ok": False, "reason": str(error)}, BROKEN
+            return {"ok": True, **_where(link, limits)}, DONE
         status = start.find(link)
-        start.check_kind(link, is_circle(flags))
+        memory.read_memory(link)
         calibrates = action == "calibrate" or bool(emulated and goal)
         if action != "status":
             memory.agree(link, kept, write=calibrates, widen=action == "calibrate")

@@ -21,8 +21,8 @@ from services.gantry.motion import (
     MotionLimits,
     box,
 )
-from services.gantry.protocol import Error, Limits, Position, Status, Word, command
-from services.gantry.rig_table import CIRCLE_YAW, LIMITS, Source
+from services.gantry.protocol import Limits, Position, Word, command
+from services.gantry.rig_table import CIRCLE_YAW, LIMITS, Source, Status
 
 UNITS = {
     "x": "m",
@@ -69,35 +69,24 @@ def agree(link: Link, limits: Mapping[str, float], write: bool, widen: bool = Fa
     """See that the rig's memory has these limits of its firmware; with ``write`` they are written if it has others.
 
     Limits that were kept become wider with ``widen`` alone, as an operator asks for it: what is safe on a rig is not up
-    to each repository with a test for it. Raises PortError then, and RigError if the memory has other limits at
-    last. A firmware without such a memory has the built-in limits; tighter ones are kept by the programs that move it
-    alone, which is logged.
+    to each repository with a test for it. Raises PortError then, and RigError if the memory has other limits at last.
     """
     found = read_memory(link)
-    if found is None:
-        tighter = {name: limit for name, limit in limits.items() if limit < LIMITS[name][1] - _NEAR}
-        if tighter:
-            _log.warning(
-                "the rig at %s has no memory for limits; its firmware does not keep %s",
-                link.name,
-                _text(tighter, link.conversion),
-            )
-        return
     if _is(found, limits):
         return
+    rig = f"the memory of the rig at {link.name} {_deviation(found, limits, link.conversion)}"
     if not write:
-        what = _deviation(found, limits, link.conversion)
-        raise RigError(f"the memory of the rig at {link.name} {what}; calibrate it, which writes them")
-    if found.source == Source.KEPT and not widen and _exceed(limits, found):
-        what = _deviation(found, limits, link.conversion)
-        raise PortError(f"the memory of the rig at {link.name} {what}; only 'dodo rig calibrate' makes them wider")
+        raise RigError(f"{rig}; calibrate it, which writes them")
+    wider = any(limit > kept + _NEAR for limit, kept in zip(limits.values(), found.values, strict=True))
+    if found.source == Source.KEPT and wider and not widen:
+        raise PortError(f"{rig}; only 'dodo rig calibrate' makes them wider")
     _forget(link)
     numbers = ",".join(f"{value:.6f}".rstrip("0").rstrip(".") for value in limits.values())
     answers = link.exchange(f"${Word.SETLIMITS}:{numbers}\n".encode("ascii") + command(Word.STATUS), start.ANSWER)
     if answers.refusals:
         raise RigError(f"the rig at {link.name} refuses its limits: {answers.refusals[0]}")
     end = time.monotonic() + _WRITING
-    while (found := read_memory(link) or found).source == Source.WRITING and time.monotonic() < end:
+    while (found := read_memory(link)).source == Source.WRITING and time.monotonic() < end:
         time.sleep(start.POLL)
     if not _is(found, limits):
         what = _deviation(found, limits, link.conversion)
@@ -105,23 +94,27 @@ def agree(link: Link, limits: Mapping[str, float], write: bool, widen: bool = Fa
     _log.info("the rig at %s keeps its limits: %s", link.name, _text(limits, link.conversion))
 
 
-def read_memory(link: Link) -> Limits | None:
-    """The memory's limits; None for a firmware that does not know them, and says so twice. Raises RigError."""
-    unknown = 0
+def read_memory(link: Link) -> Limits:
+    """The memory's limits. Raises RigError, also for the firmware of the other kind of rig, before anything moves.
+
+    Only the yaw of a circle has the limit of a whole turn: its firmware would wind up the cable of another rig.
+    """
+    rig = f"the firmware of the rig at {link.name}"
     for _ in range(start.TRIES):
-        found = link.exchange(command(Word.LIMITS) + command(Word.STATUS), start.ANSWER)
-        if found.limits is not None:
-            return found.limits
-        unknown += any(refusal.code == Error.UNKNOWN for refusal in found.refusals)
-        if unknown == 2:
-            return None
-    raise RigError(f"the rig at {link.name} does not say its limits")
+        found = link.exchange(command(Word.LIMITS) + command(Word.STATUS), start.ANSWER).limits
+        if found is None:
+            continue
+        circle = dict(zip(LIMITS, found.values, strict=True))["yaw"] > LIMITS["yaw"][1] + _NEAR
+        if circle and not link.conversion.circle:
+            raise RigError(f"{rig} is that of the kind circle: flash gantry.elf, or name the kind")
+        if link.conversion.circle and not circle:
+            raise RigError(f"{rig} is not that of the kind circle: flash gantry-circle.elf")
+        return found
+    raise RigError(f"{rig} does not say its limits")
 
 
-def shown(found: Limits | None, conversion: Conversion) -> dict[str, Any]:
-    """True limits for people and programs: by name, and where they are ``from``; empty without a memory."""
-    if found is None:
-        return {}
+def shown(found: Limits, conversion: Conversion) -> dict[str, Any]:
+    """True limits for people and programs: by name, and where they are ``from``."""
     return {**_true(dict(zip(LIMITS, found.values, strict=True)), conversion), "from": found.source.name.lower()}
 
 
@@ -139,10 +132,6 @@ def _forget(link: Link) -> None:
         time.sleep(start.POLL)
     if answers.status != Status.NOT_CALIBRATED:
         raise RigError(f"the rig at {link.name} cannot be given its limits: it still knows its home")
-
-
-def _exceed(limits: Mapping[str, float], found: Limits) -> bool:
-    return any(limit > kept + _NEAR for limit, kept in zip(limits.values(), found.values, strict=True))
 
 
 def _is(found: Limits, limits: Mapping[str, float]) -> bool:

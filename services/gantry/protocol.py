@@ -1,7 +1,7 @@
 """The rig's serial protocol (Table 4.1): ``$COMMAND:ARG1,ARG2,...`` out, ``$ARG1,ARG2,...`` back, a line each.
 
 Numbers are in SI units and radians. Answers do not say to what: three numbers are POSITION's, one is STATUS's,
-``$CIRCLE:turn`` is KIND's, ``$LIMITS:...`` is LIMITS', and ``$ERROR:code`` says why a line was not obeyed.
+``$LIMITS:...`` is LIMITS', and ``$ERROR:code`` says why a line was not obeyed.
 """
 
 import math
@@ -9,33 +9,15 @@ import re
 from dataclasses import dataclass
 from enum import StrEnum
 
-from services.gantry.rig_table import BAUD, LIMITS, Error, Source, Status
-
-__all__ = [
-    "BAUD",
-    "LATCHED",
-    "SENTENCES",
-    "Circle",
-    "Error",
-    "Limits",
-    "LineReader",
-    "Position",
-    "Refusal",
-    "Status",
-    "Word",
-    "command",
-]
+from services.gantry.rig_table import LIMITS, Error, Source, Status
 
 LONGEST = 96
 """Bytes of the longest line that can be an answer."""
 FARTHEST = 10.0
 """A position farther from the middle (m, rad) was garbled."""
 
-_NUMBER = r"[-+]?[0-9]{1,9}(?:\.[0-9]{1,9})?(?:[eE][-+]?[0-9]{1,2})?"
-_ANSWER = re.compile(rf"\$(?P<numbers>{_NUMBER}(?:,{_NUMBER}){{0,3}})\r?")
-_CIRCLE = re.compile(r"\$CIRCLE:(?P<turn>[0-9]{1,7})\r?")
-_LIMITS = re.compile(r"\$LIMITS:(?P<limits>[0-9]\.[0-9]{6}(?:,[0-9]\.[0-9]{6})*),(?P<source>[0-9])\r?")
-_REFUSAL = re.compile(r"\$ERROR:(?P<code>[0-9]{1,3})\r?")
+_NUMBER = r"[-+]?[0-9]{1,9}(?:\.[0-9]{1,9})?"
+_ANSWER = re.compile(rf"\$(?:(?P<word>ERROR|LIMITS):)?(?P<numbers>{_NUMBER}(?:,{_NUMBER})*)\r?")
 
 
 class Word(StrEnum):
@@ -52,7 +34,6 @@ class Word(StrEnum):
     FORGET = "FORGET"
     GOTOLEFT = "GOTOLEFT"
     GOTORIGHT = "GOTORIGHT"
-    KIND = "KIND"
 
 
 SENTENCES = {
@@ -75,13 +56,6 @@ class Position:
     x: float
     y: float
     yaw: float
-
-
-@dataclass(frozen=True)
-class Circle:
-    """The rig's yaw turns without end, by so many microsteps a turn."""
-
-    turn: int
 
 
 @dataclass(frozen=True)
@@ -108,7 +82,7 @@ class Refusal:
         return f"$ERROR:{self.code} ({names[0] if names else 'unknown to this version'})"
 
 
-Answer = Position | Status | Refusal | Circle | Limits
+Answer = Position | Status | Refusal | Limits
 
 
 def command(word: Word, *arguments: float) -> bytes:
@@ -124,30 +98,20 @@ def command(word: Word, *arguments: float) -> bytes:
 
 def answer(line: str) -> Answer | None:
     """The answer in a line without its end; None for any other line."""
-    refusal = _REFUSAL.fullmatch(line)
-    if refusal is not None:
-        return Refusal(int(refusal["code"]))
-    circle = _CIRCLE.fullmatch(line)
-    if circle is not None:
-        return Circle(int(circle["turn"]))
-    limits = _LIMITS.fullmatch(line)
-    if limits is not None:
-        return _limits(limits["limits"].split(","), int(limits["source"]))
     match = _ANSWER.fullmatch(line)
     if match is None:
         return None
-    numbers = [float(text) for text in match["numbers"].split(",")]
+    texts = match["numbers"].split(",")
+    numbers = [float(text) for text in texts]
+    if match["word"] == "ERROR":
+        return Refusal(int(texts[0])) if len(texts) == 1 and texts[0].isdigit() else None
+    if match["word"] == "LIMITS":
+        *values, source = numbers
+        fits = len(values) == len(LIMITS) and min(values) > 0 and source in set(Source)
+        return Limits(tuple(values), Source(int(source))) if fits else None
     if len(numbers) == 3 and max(map(abs, numbers)) <= FARTHEST:
         return Position(*numbers)
-    if len(numbers) == 1 and match["numbers"] in {str(int(status)) for status in Status}:
-        return Status(int(numbers[0]))
-    return None
-
-
-def _limits(texts: list[str], source: int) -> Limits | None:
-    if len(texts) != len(LIMITS) or source not in set(Source):
-        return None
-    return Limits(tuple(map(float, texts)), Source(source))
+    return Status(int(texts[0])) if texts in [[str(int(status))] for status in Status] else None
 
 
 class LineReader:

@@ -1,7 +1,4 @@
-"""The serial protocol and the rig in numbers.
-
-Made of firmware/protocol.yml by scripts/make-protocol: change it there.
-"""
+"""The serial protocol and the rig in numbers; firmware/gantry/protocol.h has the same, and the tests compare them."""
 
 from enum import IntEnum
 

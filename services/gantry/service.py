@@ -1,14 +1,8 @@
-"""The gantry on the bus: moves the rig as the vehicle moves, and publishes the rig's position.
-
-Its telemetry says how evenly commands are sent to the rig, and how long the rig takes to answer.
-"""
+"""The gantry on the bus: moves the rig as the vehicle moves, and publishes the rig's position."""
 
 import math
-import statistics
 import time
-from array import array
-from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from google.protobuf.message import Message
@@ -18,56 +12,10 @@ from services.base.process import interruptible
 from services.gantry import memory, start
 from services.gantry.emulator import EmulatedRig
 from services.gantry.link import REQUEST_STATE, Link, PortError, RigError, SerialPort, checked
-from services.gantry.memory import conversion_of, is_circle, kept_limits, motion_limits
+from services.gantry.memory import conversion_of, kept_limits, motion_limits
 from services.gantry.motion import Shaper, Velocity
-from services.gantry.protocol import SENTENCES, Position, Refusal, Status, Word, command
-
-MOST = 1_000_000
-"""Turns that are counted: 14 hours at 20 Hz."""
-
-
-class LinkTelemetry:
-    """Notes turns of ``period`` s; as a string one line with the jitter of RUN and the latency of POSITION in ms."""
-
-    def __init__(self, period: float) -> None:
-        self._period = period
-        self._began, self._took = array("d"), array("d")
-
-    def note(self, began: float, answered: float | None) -> None:
-        """A turn: when its commands were sent, and when all answers were there (s); None if they were not."""
-        if len(self._began) < MOST:
-            self._began.append(began)
-            if answered is not None:
-                self._took.append(answered - began)
-
-    @property
-    def jitter(self) -> tuple[float, float, float]:
-        """Median, 95 % and largest distance (s) of a period from the one that it should be; 0 before two turns."""
-        return _summary([abs(after - before - self._period) for before, after in pairwise(self._began)])
-
-    @property
-    def latency(self) -> tuple[float, float, float]:
-        """Median, 95 % and largest time (s) from RUN, POSITION and STATUS to the last of the answers."""
-        return _summary(self._took)
-
-    def __str__(self) -> str:
-        missed = len(self._began) - len(self._took)
-        return (
-            f"{len(self._began)} turns of {1000 * self._period:g} ms, {missed} without an answer; "
-            f"jitter {_text(self.jitter)}; position after {_text(self.latency)}"
-        )
-
-
-def _summary(values: Sequence[float]) -> tuple[float, float, float]:
-    if len(values) < 2:
-        return (values[0],) * 3 if values else (0.0, 0.0, 0.0)
-    return statistics.median(values), statistics.quantiles(values, n=20, method="inclusive")[-1], max(values)
-
-
-def _text(summary: tuple[float, float, float]) -> str:
-    middle, most, largest = (1000 * value for value in summary)
-    return f"median {middle:.1f} ms, 95 % {most:.1f} ms, max {largest:.1f} ms"
-
+from services.gantry.protocol import SENTENCES, Position, Refusal, Word, command
+from services.gantry.rig_table import Status
 
 EMULATED = "emulated"
 MICROSECONDS = 1_000_000
@@ -109,7 +57,6 @@ class Gantry(Service):
         self._last_state: float | None = None
         self._alive: float | None = None
         self._alive_time = 0
-        self.telemetry = LinkTelemetry(self._turn / MICROSECONDS)
         self._at: Position | None = None
         self._blind = 0
         self._moved = False
@@ -135,9 +82,7 @@ class Gantry(Service):
 
     def _exchange(self) -> Iterator[Output]:
         self._supervise()
-        begin = self._wall()
         at, status, refusals, *_ = self.link.exchange(self._command() + REQUEST_STATE, self._patience)
-        self.telemetry.note(begin, self._wall() if at is not None else None)
         self._at, self._blind = (self._at, self._blind + self._turn) if at is None else (at, 0)
         if status is not None:
             self._check(status)
@@ -233,7 +178,7 @@ def build(context: Context) -> Service:
     context.resources.callback(link.close)
     with interruptible():
         status = start.find(link)
-        start.check_kind(link, is_circle(flags))
+        memory.read_memory(link)
         start.settle(link, status)
         calibrates = bool(flags["calibrate"] or emulated)
         memory.agree(link, kept_limits(flags), write=calibrates)
@@ -242,6 +187,4 @@ def build(context: Context) -> Service:
         elif status == Status.NOT_CALIBRATED:
             raise PortError(f"{start.trouble(link, status)}; --calibrate makes it find its home")
         start.go(link, goal, flags["patience"])
-    gantry = Gantry(context, link, emulated)
-    context.resources.callback(lambda: context.log.info("%s", gantry.telemetry))
-    return gantry
+    return Gantry(context, link, emulated)

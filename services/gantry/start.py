@@ -5,8 +5,8 @@ import time
 from collections.abc import Callable
 
 from services.gantry.link import REQUEST_STATE, Link, RigError
-from services.gantry.protocol import LATCHED, SENTENCES, Error, Position, Status, Word, command
-from services.gantry.rig_table import TURN
+from services.gantry.protocol import LATCHED, SENTENCES, Position, Word, command
+from services.gantry.rig_table import Status
 
 NEAR, NEAR_YAW = 0.005, math.radians(1.5)
 """m and rad within which the rig has reached a place: 1.5 degrees are less than a full step of the turn."""
@@ -25,30 +25,6 @@ def find(link: Link) -> Status:
         if status is not None:
             return status
         time.sleep(POLL)
-
-
-def check_kind(link: Link, circle: bool) -> None:
-    """Raises RigError unless the rig's firmware is of its kind: that of a circle would wind up another rig's cable.
-
-    The firmware of the other kind does not know KIND. It has to say so twice, as a damaged KIND is unknown, too.
-    """
-    unknown = 0
-    for _ in range(TRIES):
-        found = link.exchange(command(Word.KIND) + command(Word.STATUS), ANSWER)
-        unknown += any(refusal.code == Error.UNKNOWN for refusal in found.refusals)
-        if found.circle is not None or unknown == 2:
-            break
-    rig = f"the firmware of the rig at {link.name}"
-    if found.circle is None and unknown < 2:
-        raise RigError(f"{rig} does not say of which kind it is")
-    if found.circle is None and circle:
-        raise RigError(f"{rig} is not that of the kind circle: it does not know KIND")
-    if found.circle is not None and not circle:
-        raise RigError(
-            f"{rig} is that of the kind circle, which would wind up a cable: flash gantry.elf, or name the kind"
-        )
-    if found.circle is not None and (turns := found.circle.turn) != TURN:
-        raise RigError(f"{rig} has a turn of {turns} microsteps, expected {TURN}: it is of another version")
 
 
 def settle(link: Link, status: Status) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from dodo_dsl.run.rigs import camera_calibration
+from dodo_dsl.run.rigs import calibration
 
 WIDTH, HEIGHT, FACTOR = 640, 480, 2
 MATRIX = np.array([[530.0, 0.0, 325.0], [0.0, 528.0, 236.0], [0.0, 0.0, 1.0]])
@@ -39,7 +39,7 @@ def _rays() -> Any:
 
 def _picture(rays: Any, a: float, b: float, x: float, y: float) -> Any:
     """Each pixel's ray meets the board's plane in a place of the board, whose colour it has."""
-    drawn = camera_calibration.board_picture(4)
+    drawn = calibration.board().generateImage((9 * 28 * 4, 6 * 28 * 4))
     rotation, _ = cv2.Rodrigues(np.array([math.radians(a), math.radians(b), 0.0]))
     middle = np.array([x, y, 0.28])
     normal = rotation[:, 2]

@@ -10,7 +10,7 @@ from dodo_dsl import compiler
 from dodo_dsl.plan.model import Plan, Suite
 from dodo_dsl.plan.pipeline import DEFAULT_TAGS, pipeline
 from dodo_dsl.plan.plan_json import from_json, to_json
-from dodo_dsl.run.rigs.permission import refuse_unattended
+from dodo_dsl.run.rigs.ports import refuse_unattended
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.spec.load import Settings
 from dodo_dsl.spec.rig import SIMULATION_TAG

@@ -33,7 +33,7 @@ from dodo_dsl.run.docker.pulls import Pulls, image_hints
 from dodo_dsl.run.hidden_paths import hidden_paths
 from dodo_dsl.run.process.commands import needed_paths
 from dodo_dsl.run.protocol import BackendError, Say
-from dodo_dsl.run.rigs.permission import known_ports
+from dodo_dsl.run.rigs.ports import known_ports
 from dodo_dsl.run.sides import APPLICATION
 
 

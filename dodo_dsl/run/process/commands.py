@@ -23,7 +23,7 @@ from dodo_dsl.run.process.environment import (
     expanded,
 )
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot, named_paths, package_path
-from dodo_dsl.run.rigs.permission import masked
+from dodo_dsl.run.rigs.ports import masked
 
 _NUL = "\0"
 

@@ -1,6 +1,6 @@
 """Manual access to a rig and its camera through their programs, while nobody else uses the rig.
 
-A rig's settings become flags of the programs that move it, and limits that its operator permits.
+A rig's settings become flags of the programs that move it.
 """
 
 import asyncio
@@ -16,17 +16,14 @@ from typing import Any
 from dodo_dsl.diagnostics import shown_path
 from dodo_dsl.plan.added_services import CAMERA, DRAWN, hardware
 from dodo_dsl.plan.model import Flag, PlannedService
-from dodo_dsl.run import leases
 from dodo_dsl.run.process.environment import base_environment
 from dodo_dsl.run.process.slot import package_path
-from dodo_dsl.run.rigs.leases import devices_in, leased, release, taken
-from dodo_dsl.run.rigs.permission import Motion, motion_of
+from dodo_dsl.run.rigs.leases import leased
 from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
-from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument, ValueProblem, convert, default_value, resolved
 from dodo_dsl.spec.manifest import Manifest, Parameter, load_manifests
 from dodo_dsl.spec.model import Spec, Use
-from dodo_dsl.spec.rig import CIRCLE, MEMORY, Rig
+from dodo_dsl.spec.rig import Rig
 
 MANUAL = ("python", "-m", "services.gantry.manual")
 PATIENCE_S = 180.0
@@ -104,35 +101,6 @@ async def _end(process: asyncio.subprocess.Process) -> None:
         await process.wait()
 
 
-def query_exclusively(
-    cid: int | None,
-    user: str,
-    command: Command,
-    say: Callable[[str], None],
-    patience_s: float = leases.DEFAULT_PATIENCE_S,
-) -> dict[str, Any]:
-    """``query`` with a program and its words, while nobody else uses the rig; a signal ends both.
-
-    ``user`` names the holder of the lease to others. Raises RigProblem and LeaseTimeout.
-    """
-    try:
-        return asyncio.run(_query_exclusively(cid, user, command, say, patience_s))
-    except asyncio.CancelledError:
-        raise KeyboardInterrupt from None
-
-
-async def _query_exclusively(
-    cid: int | None,
-    user: str,
-    command: Command,
-    say: Callable[[str], None],
-    patience_s: float,
-) -> dict[str, Any]:
-    _end_with_signals()
-    async with leased(cid, user, say, patience_s, devices_in(command[1])) as descriptors:
-        return await query(*command, descriptors=descriptors)
-
-
 def _end_with_signals() -> None:
     task = asyncio.current_task()
     assert task is not None
@@ -144,27 +112,26 @@ def _end_with_signals() -> None:
 def occupied(
     cid: int | None, user: str, devices: Sequence[str], say: Callable[[str], None], patience_s: float
 ) -> Iterator[Callable[[Command], dict[str, Any]]]:
-    """For several queries, between which nobody else uses the rig either; a signal ends each.
+    """For queries with a program and its words, while and between which nobody else uses the rig; a signal ends each.
 
-    Raises LeaseTimeout, the queries RigProblem.
+    ``user`` names the holder of the leases to others. Raises LeaseTimeout, and the queries RigProblem.
     """
-    held = asyncio.run(taken(cid, user, say, patience_s, devices))
-    descriptors = tuple(lease.descriptor for lease in held)
+    with asyncio.Runner() as runner, contextlib.ExitStack() as held:
+        leasing = leased(cid, user, say, patience_s, devices)
+        descriptors = runner.run(leasing.__aenter__())
+        held.callback(lambda: runner.run(leasing.__aexit__(None, None, None)))
 
-    async def asked(command: Command) -> dict[str, Any]:
-        _end_with_signals()
-        return await query(*command, descriptors=descriptors)
+        async def asked(command: Command) -> dict[str, Any]:
+            _end_with_signals()
+            return await query(*command, descriptors=descriptors)
 
-    def ask(command: Command) -> dict[str, Any]:
-        try:
-            return asyncio.run(asked(command))
-        except asyncio.CancelledError:
-            raise KeyboardInterrupt from None
+        def ask(command: Command) -> dict[str, Any]:
+            try:
+                return runner.run(asked(command))
+            except asyncio.CancelledError:
+                raise KeyboardInterrupt from None
 
-    try:
         yield ask
-    finally:
-        release(held)
 
 
 PROGRAMS = {
@@ -206,12 +173,17 @@ def _flags(rig: Rig, manifest: Manifest, spec: Spec | None, use: Use | None) -> 
         given = list(resolved(spec, use, manifest, rig).arguments.values())
     else:
         given = [_of_rig(rig, parameter) for parameter in manifest.parameters.values()]
+    _refuse_invalid(given)
+    values = ((argument.parameter.name, argument.value) for argument in given if argument.value)
+    return tuple(Flag(name, str(value.path or value.text)) for name, value in values)
+
+
+def _refuse_invalid(given: Sequence[Argument]) -> None:
     for argument in given:
         if argument.problem:
             span = argument.problem.span
-            raise RigProblem(f"{span.file}:{span.line}:{span.column}: {argument.problem.message}", usage=True)
-    values = ((argument.parameter.name, argument.value) for argument in given if argument.value)
-    return tuple(Flag(name, str(value.path or value.text)) for name, value in values)
+            text = f"{shown_path(span.file)}:{span.line}:{span.column}: {argument.problem.message}"
+            raise RigProblem(text, usage=True)
 
 
 def _of_rig(rig: Rig, parameter: Parameter) -> Argument:
@@ -219,7 +191,7 @@ def _of_rig(rig: Rig, parameter: Parameter) -> Argument:
     if entry is None:
         return Argument(parameter, None, default_value(parameter))
     try:
-        return Argument(parameter, entry, convert(parameter, entry.value, Path.cwd()))
+        return Argument(parameter, entry, convert(replace(parameter, name=parameter.rig), entry.value, Path.cwd()))
     except ValueProblem as problem:
         return Argument(parameter, entry, None, problem.diagnostic)
 
@@ -234,44 +206,8 @@ def judged_classes(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec) -> l
     return sorted({name for text in texts for name in text.split(",") if name})
 
 
-TEXTS = (("serial", "serial", ""), (CIRCLE, "kind", ""), (MEMORY, "limits", ""))
-RANGES = (("limits.x", "range-x", "m"), ("limits.y", "range-y", "m"), ("limits.yaw", "range-yaw", "deg"))
-CONSTANTS = tuple(
-    (f"axes.{axis}.{what}", f"{what}-{axis}", unit)
-    for axis, density in (("x", "steps/m"), ("y", "steps/m"), ("yaw", "steps/deg"))
-    for what, unit in (("steps", density), ("offset", "steps"))
-)
-"""The rig's settings that are flags of the gantry: key, flag, unit."""
-
-
 def flags(rig: Rig) -> list[str]:
     """The rig's port, kind, limits and constants as the gantry's flags; raises RigProblem for an invalid one."""
-    numbers = _numbers(rig)
-    found = []
-    for key, flag, unit in (*TEXTS, *RANGES, *CONSTANTS):
-        entry = rig.entry(key)
-        if entry is None or not isinstance(entry.value, Scalar):
-            continue
-        found.append(f"--{flag}={numbers[key] if unit else entry.value.text}")
-    return found
-
-
-def motion(rig: Rig) -> Motion:
-    """The rig's motion by these flags."""
-    return motion_of(dict(word.removeprefix("--").split("=", 1) for word in flags(rig)), manual=True)
-
-
-def _numbers(rig: Rig) -> dict[str, str]:
-    """All limits and constants of the rig in the gantry's units, by their keys."""
-    found = {}
-    for parameter in load_manifests()[0]["gantry"].parameters.values():
-        entry = rig.entry(parameter.rig)
-        if entry is None or not parameter.rig.startswith(("limits.", "axes.")):
-            continue
-        try:
-            found[parameter.rig] = convert(replace(parameter, name=parameter.rig), entry.value, Path.cwd()).text
-        except ValueProblem as problem:
-            span = problem.diagnostic.span
-            text = f"{shown_path(span.file)}:{span.line}:{span.column}: {problem.diagnostic.message}"
-            raise RigProblem(text, usage=True) from None
-    return found
+    found = [_of_rig(rig, parameter) for parameter in load_manifests()[0]["gantry"].parameters.values()]
+    _refuse_invalid(found)
+    return [f"--{given.parameter.name}={given.value.text}" for given in found if given.entry and given.value]

@@ -10,8 +10,7 @@ from dodo_dsl.run import leases
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.process.host_isolation import is_claimed
 from dodo_dsl.run.protocol import BackendError, Say
-from dodo_dsl.run.rigs.leases import device_leases, devices_of, quarantined
-from dodo_dsl.run.rigs.permission import refuse_test
+from dodo_dsl.run.rigs.leases import device_keys, devices_of, quarantined
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.run.sides import Backend
 
@@ -31,7 +30,7 @@ async def _chosen(job: Job, say: Say, stack: contextlib.AsyncExitStack) -> Job:
     usable = {f"rig-{one.plan.rig}": one for one in _usable([job, *job.others])}
 
     def attempt(name: str, about: dict[str, Any], shared: bool) -> leases.Lease | None:
-        cid, *devices = f"cid-{usable[name].plan.cid}", *device_leases(devices_of(usable[name].plan))
+        cid, *devices = f"cid-{usable[name].plan.cid}", *device_keys(devices_of(usable[name].plan))
         is_free = not is_claimed(cid) and not any(map(leases.holder, (cid, *devices)))
         return leases.try_lease(name, about, shared) if is_free else None
 
@@ -63,7 +62,6 @@ def _refusal(job: Job) -> str:
     if absent:
         return f"there is no '{absent[0]}'"
     try:
-        refuse_test(job.plan, ())
         reason = quarantined(job.plan.rig, devices)
     except RigProblem as problem:
         return str(problem)

@@ -15,29 +15,13 @@ from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.access import query
 from dodo_dsl.run.rigs.leases import devices_of, leased, quarantine, quarantined
-from dodo_dsl.run.rigs.permission import refuse_test
+from dodo_dsl.run.rigs.ports import refuse_shared_port
 from dodo_dsl.run.rigs.problems import ProgramTimeout, RigProblem
 
 PATIENCE_S, TRIES = 90.0, 2
 """s: from the far corner the rig searches its home position for 20 s, and for most of a minute if it repeats that."""
-RANGES = ("range-x", "range-y", "range-yaw")
-CONSTANTS = tuple(f"{what}-{axis}" for axis in ("x", "y", "yaw") for what in ("steps", "offset"))
-
-
-@dataclass(frozen=True)
-class HealthCheck:
-    """The Python module that checks a service's hardware, its action, and the flags of the service that it takes."""
-
-    module: str
-    action: tuple[str, ...]
-    flags: tuple[str, ...]
-
-
-CHECKS = {
-    "gantry": HealthCheck("services.gantry.manual", ("check",), ("serial", "kind", "limits", *RANGES, *CONSTANTS)),
-    "camera": HealthCheck("services.camera.health_check", (), ("source", "width", "height", "freq", "exposure")),
-}
-"""By the name of the service."""
+CHECKS = {"gantry": ("services.gantry.manual", "check"), "camera": ("services.camera.health_check",)}
+"""By the name of the service: the module that checks its hardware by the service's flags, and its action."""
 
 
 async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int, ...], is_fit: bool = False) -> None:
@@ -63,12 +47,13 @@ async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int
 async def _failure(plan: Plan, descriptors: tuple[int, ...]) -> str:
     """Why the rig's gantry or camera is unfit; empty when both are fit. Raises RigProblem."""
     for service in plan.services:
-        check = CHECKS.get(service.uses)
-        if check is None or _reads_a_file(service):
+        module, *action = CHECKS.get(service.uses, ("",))
+        if not module or _reads_a_file(service):
             continue
-        words = [f"--{flag.name}={flag.value}" for flag in service.flags if flag.name in check.flags]
+        flags = (flag for flag in service.flags if flag.kind == "text" and flag.name != "cid")
+        words = [f"--{flag.name}={flag.value}" for flag in flags]
         try:
-            answer = await _query(("python", "-m", check.module), [*words, *check.action], descriptors)
+            answer = await _query(("python", "-m", module), [*words, *action], descriptors)
         except ProgramTimeout as timeout:
             return f"its health check hung {TRIES} times: {timeout}"
         if not answer.get("ok"):
@@ -88,9 +73,6 @@ async def _query(program: Sequence[str], words: Sequence[str], descriptors: tupl
     return await query(program, words, PATIENCE_S, descriptors)
 
 
-GANTRY, CALIBRATE = "gantry", "calibrate"
-
-
 @dataclass
 class RigSession:
     """What holds from test to test of one command: ``fit`` rigs passed their check, and their last test was judged.
@@ -106,8 +88,8 @@ class RigSession:
         if plan.rig not in self.fit:
             return plan
         services = (
-            replace(service, flags=tuple(flag for flag in service.flags if flag.name != CALIBRATE))
-            if service.uses == GANTRY
+            replace(service, flags=tuple(flag for flag in service.flags if flag.name != "calibrate"))
+            if service.uses == "gantry"
             else service
             for service in plan.services
         )
@@ -119,20 +101,18 @@ async def attended(
     plan: Plan,
     slot: Slot,
     say: Callable[[str], None],
-    roots: Sequence[Path] = (),
     session: RigSession | None = None,
 ) -> AsyncIterator[tuple[int, ...]]:
     """Leases and checks a real rig's devices, and sends a heartbeat within the block; does nothing for other tests.
 
-    Gives all descriptors by which a program holds the rig, with those of the ``slot``. ``roots`` are the folders of the
-    test's repository, whose tests the machine's operator may not let use it. A rig that is fit in the ``session`` is
-    not checked. Raises BackendError then, and when the rig is in use, in quarantine, or fails its health check.
+    Gives all descriptors by which a program holds the rig, with those of the ``slot``. A rig that is fit in the
+    ``session`` is not checked. Raises BackendError when the rig is in use, in quarantine, or fails its check.
     """
     if not plan.is_real:
         yield slot.descriptors
         return
     async with contextlib.AsyncExitStack() as stack:
-        refuse_test(plan, roots)
+        refuse_shared_port(plan)
         more = await stack.enter_async_context(leased(None, plan.slug, say, devices=devices_of(plan)))
         is_fit = session is not None and plan.rig in session.fit
         if session:

@@ -1,29 +1,38 @@
-"""``dodo rig measure``: with given readings, and with a rig on a pseudo terminal that differs from the table."""
+"""``dodo rig measure``: axes of a rig on a pseudo terminal that differs from the table, and a camera by its frames."""
 
-import json
+import contextlib
 import math
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 import yaml
 
+from dodo_dsl.cli import rig_measure
 from dodo_dsl.cli.main import main
+from dodo_dsl.run.rigs import access
+from dodo_dsl.run.rigs.access import Command
+from dodo_dsl.spec.deployment import load_deployment
+from dodo_dsl.spec.manifest import load_manifests
+from tests.calibration.board_pictures import pictures
 from tests.run.rigs.place import Place, place
 from tests.services.gantry.fake_rig import FakeRig
 
 __all__ = ["place"]
 
-RIGS = "dodo: 1\nrigs:\n  desk: {kind: dynamic, cid: 120}  # mine\n"
-EXACT = [f"--reading=x:{3223.3 * p / 1000 + 2965.4}:{p}mm" for p in (-700, -300, 300, 700)]
+RIGS = "dodo: 1\nrigs:\n  desk: {kind: static, cid: 120, camera: {source: rpicam, width: 640, height: 480}}  # mine\n"
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
     (tmp_path / "dodo.yml").write_text(RIGS)
     return tmp_path
 
@@ -34,61 +43,17 @@ def measure(*words: str, code: int) -> str:
     return output.getvalue()
 
 
-def test_readings_of_flags_are_written(folder: Path) -> None:
-    said = measure("desk", *EXACT, code=0)
-    assert "desk: x: 3223.3000 ± " in said and "offset 2965.4000 ± " in said and said.count("residual") == 4
-    assert f"written into {folder / 'dodo.yml'}; 'dodo rig calibrate desk' gives the rig its limits by" in said
-    text = (folder / "dodo.yml").read_text()
-    assert "    axes: {x: {steps: 3223.3000 steps/m, offset: 2965.4000 steps}}}  # mine\n" in text
-    assert "compiled" not in text and main(["rig", "status", "desk"], StringIO(), StringIO()) == 0
-
-
-def test_a_circle_has_only_the_offset_of_its_yaw_measured(folder: Path) -> None:
-    (folder / "dodo.yml").write_text(RIGS.replace("dynamic", "circle"))
-    # the heading backward has two names
-    readings = [f"--reading=yaw:{s}:{p}deg" for s, p in ((0.0, 175.5), (50.0, -94.5), (100.0, -4.5), (190.0, 517.5))]
-    said = measure("desk", *readings, code=0)
-    assert "yaw: 0.5555556 ± 0 steps/deg, offset 102.5000 ± " in said
-    rig = yaml.safe_load((folder / "dodo.yml").read_text())["rigs"]["desk"]
-    assert rig["axes"] == {"yaw": {"offset": "102.5000 steps"}}
-    assert main(["rig", "status", "desk"], StringIO(), StringIO()) == 0
-
-
-def test_a_dry_run_writes_nothing_and_json_says_all(folder: Path) -> None:
-    result = json.loads(measure("desk", *EXACT, "--dry-run", "--json", code=0))
-    assert (result["rig"], result["written"], result["axes"]["x"]["unit"]) == ("desk", "", "steps/m")
-    assert result["axes"]["x"]["steps"] == pytest.approx(3223.3) and len(result["axes"]["x"]["readings"]) == 4
-    assert (folder / "dodo.yml").read_text() == RIGS
-
-
-def test_a_file_of_which_one_reading_is_off_is_refused_with_its_place(folder: Path) -> None:
-    rows = [{"steps": f"{0.55 * p + 83} steps", "reads": f"{p} deg"} for p in (-100, -50, 0, 50, 100)]
-    rows[1]["reads"] = "-52 deg"
-    (folder / "r.yml").write_text(yaml.safe_dump({"yaw": rows}))
-    said = measure("desk", "--readings", "r.yml", code=1)
-    assert (
-        "yaw: reading 2, -52.00 deg at 55.50 steps, is -2.00 deg off the line of the others, and 0.50 deg are" in said
-    )
-    assert "nothing is written; the readings:\nyaw:\n  - {steps: 28.0000 steps, reads: -100.0000 deg}\n" in said
-    assert (folder / "dodo.yml").read_text() == RIGS
-
-
 @pytest.mark.parametrize(
-    ("words", "code", "said"),
+    ("words", "said"),
     [
-        (["desk"], 2, "rig 'desk' has no serial port, so it cannot move"),
-        (["desk", "--places", "3"], 2, "--places is 3, expected at least 4"),
-        (["emulated"], 2, "the emulated rig is as its firmware has it"),
-        (["desk", "--axes", "x,z"], 2, "there is no axis 'z', expected some of x, y, yaw"),
-        (["desk", "--reading", "x:1"], 2, "'x:1' is not a reading, expected AXIS:STEPS:PLACE"),
-        (["desk", "--readings", "none.yml"], 2, "none.yml:1: cannot read the file"),
-        (["desk", *EXACT, "--axes", "x,y"], 1, "y has 0 readings, expected at least 4"),
-        (["desk", *EXACT[:1]], 1, "x has 1 reading, expected at least 4"),
-        (["desk", *(word.replace("mm", "cm") for word in EXACT)], 1, "expected 2988 to 3652: are units, signs and"),
+        (["desk"], "rig 'desk' has no serial port, so it cannot move"),
+        (["desk", "--places", "3"], "--places is 3, expected at least 4"),
+        (["emulated"], "the emulated rig is as its firmware has it"),
+        (["desk", "--axes", "x,z"], "there is no axis 'z', expected some of x, y, yaw"),
     ],
 )
-def test_what_cannot_be_measured(folder: Path, words: list[str], code: int, said: str) -> None:
-    assert said in measure(*words, code=code)
+def test_what_cannot_be_measured(folder: Path, words: list[str], said: str) -> None:
+    assert said in measure(*words, code=2)
     assert (folder / "dodo.yml").read_text() == RIGS
 
 
@@ -111,7 +76,7 @@ def test_an_axis_is_measured_in_a_dialogue(place: Place, monkeypatch: pytest.Mon
     monkeypatch.setattr(sys, "stdin", Operator(place.rig, slips.get))
     place.rig.homes_slowly = False
     said = place.dodo("rig", "measure", "fake", "--axes", "yaw", "--places", "4", code=0)
-    assert said.count("Its true place, such as") == 7, said
+    assert said.count("Its true position, such as") == 7, said
     assert "'forty' is not a quantity in deg" in said and "'40 mm' is a length, expected an angle in deg" in said
     assert re.search(r"yaw: reading 2, 10\.00 deg at .* steps, is \+\d+\.\d\d deg off .*; it is read again", said)
     rig = yaml.safe_load((place.folder / "dodo.yml").read_text())["rigs"]["fake"]
@@ -120,6 +85,19 @@ def test_an_axis_is_measured_in_a_dialogue(place: Place, monkeypatch: pytest.Mon
     assert len(place.rig.commands("CALIBRATE")) == 1 and place.rig.last() == "STOP"
     place.dodo("rig", "goto", "fake", "0", "0", "105", code=0)
     assert math.degrees(place.rig.at[2]) == pytest.approx(100, abs=0.01)
+
+
+@pytest.mark.realtime
+def test_readings_that_cannot_be_the_rigs_change_nothing(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Careless(Operator):
+        def readline(self) -> str:
+            return f"{1.5 * math.degrees(self.rig.at[2]):.4f} deg\n"
+
+    monkeypatch.setattr(sys, "stdin", Careless(place.rig, lambda _: None))
+    before = (place.folder / "dodo.yml").read_text()
+    said = place.dodo("rig", "measure", "fake", "--axes", "yaw", "--places", "4", code=1)
+    assert "expected 0.495 to 0.605: are units, signs and the middle of the readings right?; nothing is written" in said
+    assert (place.folder / "dodo.yml").read_text() == before
 
 
 @pytest.mark.realtime
@@ -135,14 +113,37 @@ def test_others_wait_while_the_operator_reads_and_the_end_of_answers_ends_it(
 
     monkeypatch.setattr(sys, "stdin", Slow(place.rig, lambda _: None))
     said = place.dodo("rig", "measure", "fake", code=2)
-    assert "standard input ended; --readings FILE, --reading or --pictures FOLDER needs no answers" in said
+    assert "standard input ended, and nothing is written" in said
     assert "test 'dodo rig measure'" in others[0]
     assert not place.rig.received
 
 
-@pytest.mark.realtime
-def test_readings_are_shown_when_the_answers_end_early(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "stdin", Operator(place.rig, {1: "\n", 2: "-700 mm\n", 3: ""}.get))
-    said = place.dodo("rig", "measure", "fake", "--axes", "x", code=2)
-    assert "nothing is written; the readings until then:\nx:\n  - {steps: " in said
-    assert "reads: -700.0000 mm}\n" in said and "standard input ended" in said
+@pytest.mark.thorough
+def test_a_camera_is_measured_in_a_dialogue_and_written(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = [np.full((480, 640), 235, np.uint8), *pictures()]
+    asked = []
+
+    @contextlib.contextmanager
+    def occupied(*_: object) -> Iterator[Callable[[Command], dict[str, Any]]]:
+        def query(command: Command) -> dict[str, Any]:
+            asked.append(command)
+            output = next(word for word in command[1] if word.startswith("--output="))
+            cv2.imwrite(output.removeprefix("--output="), shown[len(asked) - 1])
+            return {"ok": True}
+
+        yield query
+
+    monkeypatch.setattr(rig_measure, "occupied", occupied)
+    monkeypatch.setattr(rig_measure, "FRAMES", 9)
+    monkeypatch.setattr(sys, "stdin", StringIO("\n" * 10))
+    said = measure("desk", "--camera", code=0)
+    assert "it shows fewer than 12 corners of the board: once more" in said and "focal-y: 52" in said
+    assert len(asked) == 10 and "--source=rpicam" in asked[0][1] and "services.camera.snapshot" in asked[0][0]
+    text = (folder / "dodo.yml").read_text()
+    assert text.endswith("}}}  # mine\n")
+    deployment, problems = load_deployment(folder / "dodo.yml")
+    assert not problems and deployment.rigs["desk"].text("camera.intrinsics.fovy").startswith("48.")
+    parameters = load_manifests(())[0]["projected-truth"].parameters
+    given = {name: access._of_rig(deployment.rigs["desk"], about).value for name, about in parameters.items()}
+    numbers = [float(value.text) for name in ("fovy", "distortion.k1", "distortion.p1") if (value := given[name])]
+    assert numbers == [pytest.approx(48.887, abs=0.1), pytest.approx(-0.12, abs=0.01), pytest.approx(0.001, abs=0.01)]

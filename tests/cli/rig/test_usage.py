@@ -52,7 +52,7 @@ def test_constants_of_the_rig_are_flags_of_the_gantry(folder: Path) -> None:
     deployment, problems = load_deployment(folder / "dodo.yml")
     assert not problems
     flags = access.flags(deployment.rigs["desk"])
-    assert flags == ["--steps-x=3300", "--offset-x=2990.5", "--steps-yaw=0.549778714378214"]
+    assert flags == ["--steps-x=3300", "--steps-yaw=0.549778714378214", "--offset-x=2990.5"]
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
 from dodo_dsl.run.rigs.session import CHECKS, TRIES, examine
 from tests.run.scripted import plan
 
-GANTRY = (Flag("serial", "/dev/ttyACM0", ""), Flag("range-x", "0.5", ""), Flag("freq", "50", ""))
-CAMERA = (Flag("source", "/dev/video0", ""), Flag("width", "640", ""))
+GANTRY = (Flag("cid", "121"), Flag("serial", "/dev/ttyACM0"), Flag("range-x", "0.5"))
+CAMERA = (Flag("source", "/dev/video0"), Flag("name", "video0", "memory"), Flag("width", "640"))
 HUNG = ProgramTimeout("the rig's program gave no answer within 90 s")
 FIT = {"ok": True}
 
@@ -115,5 +115,5 @@ def test_without_a_place_for_quarantines_no_test_runs(monkeypatch: pytest.Monkey
 
 
 def test_programs_of_the_checks_exist() -> None:
-    for check in CHECKS.values():
-        assert Path(__file__).parents[3].joinpath(*check.module.split(".")).with_suffix(".py").is_file()
+    for module, *_ in CHECKS.values():
+        assert Path(__file__).parents[3].joinpath(*module.split(".")).with_suffix(".py").is_file()

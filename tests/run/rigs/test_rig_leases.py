@@ -9,7 +9,7 @@ from dodo_dsl.run import leases
 from dodo_dsl.run.rigs.leases import (
     all_quarantined,
     clear_quarantine,
-    device_leases,
+    device_keys,
     devices_in,
     leased,
     quarantine,
@@ -37,7 +37,7 @@ def test_cid_and_devices_are_held_together_and_released(folder: Path) -> None:
             return sorted(path.name.split(".")[0] for path in folder.glob("*.lease"))
 
     names = asyncio.run(scene())
-    assert names == sorted(["cid-121", *device_leases(["/dev/null", "/dev/zero"])])
+    assert names == sorted(["cid-121", *device_keys(["/dev/null", "/dev/zero"])])
     assert list(folder.glob("*.lease")) == []
 
 
@@ -50,7 +50,7 @@ def test_the_emulated_rig_has_none(folder: Path) -> None:
 
 
 def test_who_has_waited_for_the_cid_is_not_the_last_for_the_device(folder: Path) -> None:
-    (device,) = device_leases(["/dev/null"])
+    (device,) = device_keys(["/dev/null"])
     held = [leases.try_lease(name, {"test": "theirs"}) for name in ("cid-121", device)]
     order: list[str] = []
 
@@ -72,7 +72,7 @@ def test_who_has_waited_for_the_cid_is_not_the_last_for_the_device(folder: Path)
 
 @pytest.mark.thorough
 def test_a_busy_device_gives_the_cid_back(folder: Path) -> None:
-    (name,) = device_leases(["/dev/null"])
+    (name,) = device_keys(["/dev/null"])
     held = leases.try_lease(name, {"test": "theirs"})
     assert held is not None
 

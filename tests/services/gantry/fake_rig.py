@@ -35,10 +35,10 @@ class FakeRig:
         """What it answers to STATUS; a fault is latched until STOP or CALIBRATE acknowledge it."""
         self.restarted: int | None = None
         """The error's code with which it answers RUN until STOP, as after a reset."""
-        self.turn = 0
-        """Microsteps of its turn, when that is without end."""
-        self.memory: list[float] | None = [widest for _, widest in LIMITS.values()]
-        """The limits that it keeps; None for a firmware that keeps none."""
+        self.turn = False
+        """Whether its turn is without end."""
+        self.memory = [widest for _, widest in LIMITS.values()]
+        """The limits that it keeps."""
         self.source = 0
         """Where they are from."""
         self.forgetful = False
@@ -136,8 +136,6 @@ class FakeRig:
             self.memory, self.source = list(arguments), 1
         elif word == "FORGET":
             self.calibrated = False
-        elif word == "KIND":
-            self._answer(f"CIRCLE:{self.turn}")
         elif word in ("GOTO", "GOTOLEFT", "GOTORIGHT"):
             self._acknowledge()
             self.status = 4 if self.lost_index and word != "GOTO" else self.status
@@ -151,9 +149,7 @@ class FakeRig:
             self._answer(str(self._said()))
 
     def _refusal(self, word: str, arguments: tuple[float, ...]) -> int | None:
-        if word in ("KIND", "GOTOLEFT", "GOTORIGHT") and not self.turn:
-            return Error.UNKNOWN
-        if word in ("LIMITS", "SETLIMITS", "FORGET") and self.memory is None:
+        if word in ("GOTOLEFT", "GOTORIGHT") and not self.turn:
             return Error.UNKNOWN
         if word == "SETLIMITS" and self.calibrated:
             return Error.BUSY
@@ -172,7 +168,6 @@ class FakeRig:
         return None if self.calibrated and not too_fast else Error.BOUNDS if too_fast else Error.UNCALIBRATED
 
     def _answer_limits(self) -> None:
-        assert self.memory is not None
         limits = dict(zip(LIMITS, self.memory, strict=True))
         limits |= {"yaw": CIRCLE_YAW} if self.turn else {}
         self._answer("LIMITS:" + ",".join(f"{limit:.6f}" for limit in limits.values()) + f",{self.source}")

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from services.gantry import manual, start
-from services.gantry.link import Link, LinkAnswers, RigError, SerialPort
+from services.gantry import manual, memory, start
+from services.gantry.link import Link, RigError, SerialPort
 from services.gantry.manual import INDEX, find_home, run_checks
 from services.gantry.memory import wanted
 from services.gantry.motion import Conversion, MotionLimits, Shaper, Velocity, box
-from services.gantry.protocol import Circle, Position, Refusal, answer
-from services.gantry.rig_table import TURN
+from services.gantry.protocol import Position
 from tests.services.gantry.fake_rig import FakeRig
 
 LOW, HIGH = box(1.9, 1.4, math.radians(170), Conversion(circle=True))
@@ -26,61 +25,32 @@ def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Fake
     monkeypatch.setattr(manual, "TRIES", 1)
     monkeypatch.setattr(manual, "REPEATS", dict.fromkeys(("x", "y", "yaw"), 1.0))
     with FakeRig(tmp_path / "rig") as rig:
-        rig.turn = TURN
+        rig.turn = True
         link = Link(str(rig.path), lambda: SerialPort(str(rig.path)), conversion=Conversion(circle=True))
         yield rig, link
         link.close()
 
 
-def test_the_firmware_of_the_kind_is_known(line: tuple[FakeRig, Link]) -> None:
-    start.check_kind(line[1], circle=True)
-    line[0].turn = 0
-    start.check_kind(line[1], circle=False)
-
-
-@pytest.mark.parametrize(
-    ("turn", "circle", "sentence"),
-    [
-        (0, True, "is not that of the kind circle: it does not know KIND"),
-        (25_344, True, "has a turn of 25344 microsteps, expected"),
-        (TURN, False, "is that of the kind circle, which would wind up a cable"),
-    ],
-)
-def test_another_firmware_is_refused_before_anything_moves(
-    line: tuple[FakeRig, Link], turn: int, circle: bool, sentence: str
-) -> None:
+@pytest.mark.parametrize("circle", [True, False])
+def test_another_firmware_is_refused_before_anything_moves(line: tuple[FakeRig, Link], circle: bool) -> None:
     rig, link = line
-    rig.turn = turn
-    with pytest.raises(RigError, match=sentence):
-        start.check_kind(link, circle)
-    assert {word for word, _ in rig.received} == {"KIND", "STATUS"}
+    memory.read_memory(link)
+    rig.turn = circle
+    link.conversion = Conversion(circle=not circle)
+    with pytest.raises(RigError, match=f"is {'' if circle else 'not '}that of the kind circle: flash gantry"):
+        memory.read_memory(link)
+    assert {word for word, _ in rig.received} == {"LIMITS", "STATUS"}
 
 
 @pytest.mark.parametrize("action", [("goto", "0", "0", "0"), ("calibrate",), ("check",), ("home",)])
-@pytest.mark.parametrize(("turn", "kind"), [(TURN, ()), (0, ("--kind=circle",))])
+@pytest.mark.parametrize(("turn", "kind"), [(True, ()), (False, ("--kind=circle",))])
 def test_by_hand_nothing_moves_a_rig_with_the_firmware_of_the_other_kind(
-    line: tuple[FakeRig, Link], turn: int, kind: tuple[str, ...], action: tuple[str, ...]
+    line: tuple[FakeRig, Link], turn: bool, kind: tuple[str, ...], action: tuple[str, ...]
 ) -> None:
     rig, _ = line
     rig.turn = turn
     assert manual.main([f"--serial={rig.path}", *kind, *action], sys.stdout) == 1
     assert not {"GOTO", "CALIBRATE", "RUN"} & {word for word, _ in rig.received}
-
-
-def test_a_kind_that_is_garbled_once_does_not_let_a_circle_pass(
-    line: tuple[FakeRig, Link], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    answers = [LinkAnswers(refusals=(Refusal(1),)), LinkAnswers(circle=Circle(TURN))]
-    monkeypatch.setattr(line[1], "exchange", lambda *_: answers.pop(0))
-    with pytest.raises(RigError, match="would wind up a cable"):
-        start.check_kind(line[1], circle=False)
-
-
-@pytest.mark.parametrize(
-    ("text", "found"), [("$CIRCLE:25600", Circle(25_600)), ("$CIRCLE:", None), ("$CIRCLE:1.5", None)]
-)
-def test_the_answer_to_kind(text: str, found: Circle | None) -> None:
-    assert answer(text) == found
 
 
 def test_headings_have_no_edge_and_places_do() -> None:
@@ -100,7 +70,7 @@ def test_a_heading_may_have_the_name_of_another_turn() -> None:
 @pytest.mark.thorough
 def test_the_health_check_turns_around_and_passes_the_index_to_either_side(line: tuple[FakeRig, Link]) -> None:
     rig, link = line
-    assert run_checks(link, LIMITS, wanted(None, Conversion(circle=True)), 5.0)["ok"]
+    run_checks(link, LIMITS, wanted(None, Conversion(circle=True)), 5.0)
     words = [word for word, _ in rig.received if word in ("GOTOLEFT", "GOTORIGHT")]
     assert words == ["GOTOLEFT", "GOTOLEFT", "GOTORIGHT"]
 
@@ -109,8 +79,8 @@ def test_the_health_check_turns_around_and_passes_the_index_to_either_side(line:
 def test_a_rig_that_loses_its_index_on_the_way_round_is_not_fit(line: tuple[FakeRig, Link]) -> None:
     rig, link = line
     rig.lost_index = True
-    result = run_checks(link, LIMITS, wanted(None, Conversion(circle=True)), 5.0)
-    assert not result["ok"] and "lost steps" in result["reason"]
+    with pytest.raises(RigError, match="lost steps"):
+        run_checks(link, LIMITS, wanted(None, Conversion(circle=True)), 5.0)
 
 
 def test_by_hand_any_heading_is_reached(line: tuple[FakeRig, Link], capsys: pytest.CaptureFixture[str]) -> None:

