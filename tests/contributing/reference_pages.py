@@ -57,9 +57,9 @@ SETTINGS = {
     "DODO_HISTORY": "the file with the durations of earlier runs; default `~/.local/state/dodo/history.jsonl`",
     "DODO_IMAGE_<SERVICE>": "the image of a service of the application, in place of that of its compose file; "
     "its name in capitals, with `_` for other characters",
-    "DODO_LEASES": "the folder for leases of CIDs, rigs and devices, if the rigs' operator names none; "
+    "DODO_LEASES": "the folder for leases of CIDs, rigs and devices, if root made no `/var/lib/dodo/leases`; "
     "default `/run/lock/dodo-UID`, else `/tmp/dodo-UID`",
-    "DODO_RIGS": "the folder for quarantines of rigs without hardware, if the operator names none; "
+    "DODO_RIGS": "the folder for quarantines of rigs, if root made no `/var/lib/dodo/rigs`; "
     "default `~/.local/state/dodo/rigs`",
     "DODO_SUBNET": "the network of a compiled test in containers, in place of the planned one",
     "COLUMNS": "how wide lines of files are shown; default the terminal's width",
