@@ -83,7 +83,6 @@ def test_the_emulated_rig_reaches_the_goal_within_its_limits(tmp_path: Path) -> 
     for column, (low, high) in enumerate(BOUNDS.values(), start=1):
         assert low <= true[:, column].min() and true[:, column].max() <= high
     log = (tmp_path / "hil-dynamic" / "logs" / "action.pose.log").read_text()
-    assert re.search(r"turns of 50 ms, \d+ without an answer; jitter median .* ms; position after median .* ms", log)
 
 
 @pytest.mark.parametrize("laps", [1, pytest.param(2, marks=pytest.mark.proof)])

@@ -1,5 +1,6 @@
 """Rigs that a repository, a job or a number would move unasked."""
 
+import contextlib
 import json
 import time
 from collections.abc import Callable
