@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +81,6 @@ def test_the_emulated_rig_reaches_the_goal_within_its_limits(tmp_path: Path) -> 
     assert np.hypot(*np.gradient(true[::10, 1:3], true[::10, 0], axis=0).T).max() < 1
     for column, (low, high) in enumerate(BOUNDS.values(), start=1):
         assert low <= true[:, column].min() and true[:, column].max() <= high
-    log = (tmp_path / "hil-dynamic" / "logs" / "action.pose.log").read_text()
 
 
 @pytest.mark.parametrize("laps", [1, pytest.param(2, marks=pytest.mark.proof)])
