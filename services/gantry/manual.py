@@ -166,9 +166,8 @@ def main(argv: Sequence[str], stdout: TextIO) -> int:
 def _parsed(argv: Sequence[str]) -> tuple[Flags, str, list[float]]:
     words = [word for word in argv if not word.startswith("--")]
     try:
-        flags = parse(
-            load_manifest(Path(__file__).parent), [*(word for word in argv if word.startswith("--")), "--cid=1"]
-        )
+        given = ["--cid=1", *(word for word in argv if word.startswith("--"))]
+        flags = parse(load_manifest(Path(__file__).parent), given)
         action, numbers = words[0] if words else "", [number(word) for word in words[1:]]
     except ValueError as error:
         raise ManualUsageError(str(error)) from None

@@ -27,6 +27,7 @@ from tests.run.helpers import Bench
 from tests.run.rigs.place import Place, place
 
 __all__ = ["place"]
+BARE = {"name": "a", "process": [], "description": "", "example": []}
 NUMBERS = ("1_0", "1e1_0", "١", "１", "0x10", "1 0", "ten", "1-", "1,5", "nan", "inf", "1e999", "²")
 """Python's ``float`` or ``int`` takes some of these; no person writes them."""
 
@@ -58,7 +59,9 @@ PLACES: dict[str, Callable[[str, Path], str]] = {
     "dodo rig goto": lambda text, _: goto(text),
     "dodo rig --wait": lambda text, _: dodo("rig", "home", "emulated", "--wait", text)[1],
     "the rig's program": lambda text, _: the_rig_s_program(text),
-    "flags": lambda text, _: refused(lambda: parse({"parameters": {"a": {"type": "number"}}}, [f"--a={text}"])),
+    "flags": lambda text, _: refused(
+        lambda: parse({**BARE, "parameters": {"a": {"type": "number", "help": ""}}}, ["--cid=1", f"--a={text}"])
+    ),
     "a target": lambda text, path: refused(lambda: read_table(table(path, f"time,x\n0,1\n1,{text}\n"), "x", False)),
     "a time": lambda text, path: refused(lambda: read_table(table(path, f"time,x\n0,1\n{text},1\n"), "x", False)),
     "way points": lambda text, path: refused(lambda: read_points_table(table(path, f"x,y\n0,{text}\n"), 0.0)),
