@@ -159,7 +159,7 @@ class Rig(Program):
 
     def __init__(self, *options: str, place: tuple[float, float, float] = NEAR_HOME, elf: Path = ELF) -> None:
         where = ",".join(map(str, place))
-        super().__init__(str(EMULATOR), "--stepped", "--pose-rate", "0", "--start", where, *options, str(elf))
+        super().__init__(str(EMULATOR), "--stepped", "--start", where, *options, str(elf))
         self.path = self._ready()
         self.port: serial.Serial | None = None
         self._rest, self._got = b"", 0

@@ -4,7 +4,6 @@ import json
 import math
 import os
 import signal
-import socket
 import subprocess
 import termios
 import time
@@ -80,18 +79,6 @@ def test_faults_stop_the_rig_and_have_a_status(rig: Rig, command: str, status: S
     assert rig.speed() < 1e-3
 
 
-def test_noise_on_the_line_moves_nothing_by_itself(rig: Rig) -> None:
-    rig.command("noise 1000")
-    for _ in range(40):
-        rig.send_line("$STATUS")
-        rig.send_line("#RUN:0.1,0.1,0.1")
-    rig.command("noise 0")
-    rig.run(0.1)
-    rig.send_line("")
-    assert rig.extremes()["way"] == [0, 0, 0]
-    assert rig.status() == Status.IDLE
-
-
 def test_a_byte_that_the_receiver_loses_voids_its_line(rig: Rig) -> None:
     rig.command("lose")
     assert rig.send_line("$RUN:0.1,0,0") == [f"$ERROR:{int(Error.DAMAGED)}"]
@@ -127,38 +114,19 @@ def test_a_port_that_keeps_dtr_up_resets_nothing(rig: Rig) -> None:
     assert rig.status() == Status.IDLE
 
 
-def test_with_a_boot_loader_the_drivers_forget(firmware: None) -> None:
-    with Rig("--boot", "1.0") as rig:
-        rig.open()
-        rig.run(1.2)
-        rig.calibrate()
-        rig.command("reset")
-        rig.run(1.2)
-        assert rig.status() == Status.NOT_CALIBRATED
-
-
 def test_help_ends_with_an_example_that_runs(firmware: None, tmp_path: Path) -> None:
     text = subprocess.run([EMULATOR, "--help"], capture_output=True, text=True, check=True).stdout
     words = text.splitlines()[-1].removeprefix("example: ").split()
     assert words[0] == "rig-emulator" and words[-1] == "build/firmware/gantry.elf"
     link = tmp_path / "rig"
     process = subprocess.Popen(
-        [EMULATOR, "--link", link, "--publish", tmp_path / "pose", ELF],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
+        [EMULATOR, "--link", link, ELF], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     assert process.stdout is not None and process.stdin is not None
     try:
         while "port" not in (line := process.stdout.readline()):
             assert line
         assert os.path.realpath(link) == json.loads(line)["port"]
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
-            listener.bind(str(tmp_path / "pose"))
-            listener.settimeout(10)
-            while "x" not in (pose := json.loads(listener.recv(1024))):
-                pass
-            assert {"t", "x", "y", "yaw"} <= pose.keys()
         with serial.Serial(str(link), 115200, timeout=10) as port:
             answer = b""
             while not answer:
@@ -198,7 +166,6 @@ def test_it_reports_that_it_was_late(firmware: None) -> None:
     [
         ([], "expected options"),
         (["--start", "here", str(ELF)], "expected options"),
-        (["--boot", "-1", str(ELF)], "expected options"),
         (["/dev/null"], "is not a firmware"),
         (["missing.elf"], "is not a firmware"),
         ([__file__], "is not a firmware"),

@@ -268,23 +268,15 @@ def test_a_rig_that_turns_without_end_keeps_limits_but_none_of_its_yaw(circle: B
     assert circle.is_true()
 
 
-def test_the_emulated_rig_keeps_its_memory_in_a_file(firmware: None, tmp_path: Path) -> None:
-    file = str(tmp_path / "memory")
-    with Rig("--memory", file) as rig:
-        rig.open()
-        keep(rig, TIGHT)
-        rig.close()
-        rig.command("unplug power")
-        rig.run(0.2)
-        rig.plug()
-        rig.open()
-        assert kept(rig) == (pytest.approx(TIGHT), Source.KEPT)
-    with Rig("--memory", file) as rig:
-        rig.open()
-        assert kept(rig) == (pytest.approx(TIGHT), Source.KEPT)
-    with Rig() as rig:
-        rig.open()
-        assert kept(rig) == (pytest.approx(WIDEST), Source.BUILT)
+def test_the_emulated_rig_keeps_its_memory_without_power(new_rig: Rig) -> None:
+    assert kept(new_rig) == (pytest.approx(WIDEST), Source.BUILT)
+    keep(new_rig, TIGHT)
+    new_rig.close()
+    new_rig.command("unplug power")
+    new_rig.run(0.2)
+    new_rig.plug()
+    new_rig.open()
+    assert kept(new_rig) == (pytest.approx(TIGHT), Source.KEPT)
 
 
 def test_a_plug_that_is_pulled_while_the_emulated_rig_writes_leaves_the_limits_from_before(firmware: None) -> None:

@@ -125,12 +125,11 @@ static bool is_firmware(const char *elf)
     return whole && memcmp(head, "\177ELF", 4) == 0 && head[18] == AVR_MACHINE && head[19] == 0;
 }
 
-bool board_start(struct plant *plant, const char *elf, double boot)
+bool board_start(struct plant *plant, const char *elf)
 {
     elf_firmware_t firmware = {.frequency = (uint32_t)BOARD_HZ};
     avr_global_logger_set(log_nothing);
     board.plant = plant;
-    board.boot = boot;
     if (!is_firmware(elf) || elf_read_firmware(elf, &firmware) != 0 || firmware.flash == NULL)
         return false;
     strcpy(firmware.mmcu, "atmega328p");

@@ -12,11 +12,7 @@
 enum board_reset { RESET_POWER, RESET_OPENED, RESET_WATCHDOG, RESET_BUTTON };
 
 /* Load an ELF file; false when it is none. The controller is off. */
-bool board_start(struct plant *plant, const char *elf, double boot);
-
-/* Set the EEPROM to what a file holds, if there is one, and save it there; false when that fails. */
-bool board_load_memory(const char *path);
-bool board_save_memory(const char *path);
+bool board_start(struct plant *plant, const char *elf);
 
 /* Switch the controller's power; hold it in reset; reset it. */
 void board_power(bool on);

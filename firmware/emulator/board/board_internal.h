@@ -18,8 +18,8 @@ struct board {
     avr_uart_t *uart;
     avr_spi_t *spi;
     void (*reset)(avr_t *avr);
-    bool powered, held, was_reset, requested, restarting;
-    double boot, starts, standby_until;
+    bool powered, held, was_reset, requested;
+    double starts, standby_until;
     avr_cycle_count_t debt, busy_until;
     uint8_t spi_byte, sent[4096];
     size_t sent_count;

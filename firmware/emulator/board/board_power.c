@@ -43,7 +43,7 @@ void board_reset(enum board_reset reason)
     avr_reset(board.avr);
     board.requested = false;
     board.avr->data[MCUSR_DATA] = flags[reason];
-    board.starts = board.plant->time + START_UP + board.boot;
+    board.starts = board.plant->time + START_UP;
     telemetry_send("\"event\": \"reset\", \"t\": %.4f, \"reason\": \"%s\"", board.plant->time, names[reason]);
 }
 

@@ -22,4 +22,7 @@
 /* Execute a command; false when it is none of these. */
 bool plant_command(struct plant *plant, const char *line);
 
+/* The true pose as telemetry. */
+void plant_report_pose(const struct plant *plant);
+
 #endif

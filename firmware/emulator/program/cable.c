@@ -15,7 +15,7 @@
 
 static int master = -1;
 static bool hung, dtr;
-static unsigned noise, polls;
+static unsigned polls;
 static uint8_t buffer[8192];
 static size_t begin, end, written;
 static char terminal[64], *linked;
@@ -84,18 +84,6 @@ bool cable_opened(void)
     return rises;
 }
 
-void cable_noise(unsigned per_mille)
-{
-    noise = per_mille;
-}
-
-static uint8_t through_noise(uint8_t byte)
-{
-    if (noise > 0 && (unsigned)(random() % 1000) < noise)
-        byte ^= (uint8_t)(1 << random() % 8);
-    return byte;
-}
-
 void cable_fetch(void)
 {
     if (master < 0)
@@ -123,15 +111,14 @@ bool cable_read(uint8_t *byte)
 {
     if (begin == end)
         return false;
-    *byte = through_noise(buffer[begin++]);
+    *byte = buffer[begin++];
     return true;
 }
 
 void cable_write(const uint8_t *bytes, size_t count)
 {
     for (size_t i = 0; i < count && master >= 0 && !hung; i++) {
-        uint8_t byte = through_noise(bytes[i]);
-        if (write(master, &byte, 1) != 1)
+        if (write(master, bytes + i, 1) != 1)
             return;
         written++;
     }

@@ -1,4 +1,4 @@
-/* The serial cable: a pseudo terminal that a client opens, and noise on the line. */
+/* The serial cable: a pseudo terminal that a client opens. */
 #ifndef CABLE_H
 #define CABLE_H
 
@@ -15,9 +15,6 @@ void cable_unplug(void);
 /* Whether a client opened the terminal since the last call and DTR rose, which resets an Arduino. It rises unless the
  * previous client left it high (HUPCL off, as stty -hupcl does). */
 bool cable_opened(void);
-
-/* Flip a bit in so many of a thousand bytes, in either direction. */
-void cable_noise(unsigned per_mille);
 
 /* Fetch what the client sent, up to the size of the buffer. */
 void cable_fetch(void);
