@@ -54,19 +54,6 @@ def test_home_is_the_same_edge_of_the_index_from_either_side_and_from_within(
         assert bench.happened("slip") == []
 
 
-@pytest.mark.parametrize(("heading", "ways"), [(2.6, (0.3, 0.9)), (-2.6, (0.5, 0.9))])
-def test_a_rig_that_knows_its_heading_looks_for_its_index_on_the_nearer_side(
-    circle: Bench, heading: float, ways: tuple[float, float]
-) -> None:
-    circle.go(*NEAR, heading)
-    circle.extremes()
-    circle.calibrate()
-    circle.run(0.3)
-    least, most = ways
-    assert least < circle.extremes()["way"][2] < most
-    assert circle.is_true()
-
-
 @pytest.mark.parametrize(
     ("word", "way"),
     [("GOTO", 0.483), ("GOTOLEFT", 0.483), ("GOTORIGHT", 5.8)],
@@ -135,15 +122,6 @@ def test_a_counter_that_wraps_around_changes_no_heading(circle: Bench, rate: flo
     circle.command("restart")
     circle.run(0.1)
     assert circle.status() == Status.IDLE, "the counter was set back into its turn at rest"
-    assert circle.is_true()
-
-
-def test_a_reset_takes_up_a_heading_that_the_counter_still_tells(circle: Bench) -> None:
-    spin(circle, 30, 0.9)
-    circle.command("restart")
-    circle.run(1.5)
-    assert circle.status() == Status.IDLE
-    circle.run(0.2)
     assert circle.is_true()
 
 
@@ -230,26 +208,6 @@ def test_an_index_that_is_stuck_stops_the_rig_softly_and_lets_nothing_move(circl
     circle.send_line("$CALIBRATE")
     circle.until(Status.FAULT)
     assert circle.extremes()["way"][2] < 1
-
-
-def test_a_coupling_that_slips_at_rest_is_noticed_where_the_index_is(circle: Bench) -> None:
-    circle.go(0, 0, math.radians(175))
-    assert circle.status() == Status.IDLE
-    circle.command("miscount alpha 12")
-    circle.run(0.05)
-    assert circle.status() == Status.STALL
-
-
-@pytest.mark.thorough
-def test_silence_brakes_a_turn_after_500_ms(circle: Bench) -> None:
-    turn(circle, 0.9, 1.2)
-    circle.run(0.4)
-    assert circle.pose()["vyaw"] == pytest.approx(0.9, rel=0.05)
-    circle.run(0.15)
-    assert circle.status() == Status.WATCHDOG
-    circle.run(1.1)
-    assert not circle.pose()["moves"]
-    assert circle.extremes()["ramp"][2] <= 1.0
 
 
 def test_the_other_axes_have_their_edges_and_switches(circle: Bench) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from services.gantry.rig_table import BOUNDS, LINE_LONGEST, MICROSTEP, SPEED, Error, Status
+from services.gantry.rig_table import LINE_LONGEST, MICROSTEP, SPEED, Error, Status
 from tests.firmware.programs import Bench
 
 
@@ -39,15 +39,6 @@ def test_goto_while_moving_brakes_first(bench: Bench) -> None:
     assert max(bench.extremes()["ramp"][:2]) <= 0.5
 
 
-@pytest.mark.thorough
-def test_positions_are_those_of_table_4_2(bench: Bench) -> None:
-    """Step 0 is 0.9 m, 0.7 m and 83 / 0.55 degrees from the middle."""
-    bench.go(*(low for low, _ in BOUNDS.values()))
-    pose = bench.pose()
-    assert (pose["x"], pose["y"]) == pytest.approx((-2988 / 3320, -2324 / 3320), abs=2 * MICROSTEP["x"])
-    assert pose["yaw"] == pytest.approx(-83 / 0.55 * 3.14159265 / 180, abs=2 * MICROSTEP["yaw"])
-
-
 @pytest.mark.parametrize("direction", ["1", "-1"])
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_run_moves_each_axis_at_its_speed(bench: Bench, axis: int, direction: str) -> None:
@@ -77,26 +68,11 @@ def test_stop_brakes(bench: Bench, stop: str) -> None:
     assert bench.extremes()["ramp"][0] <= 0.5
 
 
-def test_stop_ends_goto(bench: Bench) -> None:
-    bench.send_line("$GOTO:0.9,0,0")
-    bench.run(0.5)
-    bench.send_line("$STOP")
-    bench.run(2)
-    assert bench.status() == Status.IDLE
-    assert bench.position()[0] < 0.3
-
-
 def test_run_ends_goto(bench: Bench) -> None:
     bench.send_line("$GOTO:0.9,0,0")
     bench.run(0.4)
     bench.keep_running("-0.1,0,0", 1.5)
     assert bench.pose()["vx"] == pytest.approx(-0.1, rel=0.02)
-
-
-def test_run_with_nothing_stands_and_needs_no_further_run(bench: Bench) -> None:
-    bench.keep_running("0,0,0", 0.2)
-    bench.run(1)
-    assert bench.status() == Status.IDLE
 
 
 @pytest.mark.thorough
@@ -138,10 +114,6 @@ def test_a_line_with_a_mistake_is_answered_and_moves_nothing(bench: Bench, line:
     assert bench.send_line(line) == error(code)
     bench.run(0.1)
     assert bench.extremes()["way"] == [0, 0, 0]
-
-
-def test_an_empty_line_is_silent(bench: Bench) -> None:
-    assert bench.send(b"\n\r\n\n") == []
 
 
 def test_a_mistake_neither_stops_nor_keeps_alive(bench: Bench) -> None:

@@ -46,15 +46,6 @@ def test_a_rig_that_differs_from_the_table(firmware: None) -> None:
         assert (pose["x"], pose["y"], pose["yaw"]) == pytest.approx(true, abs=3e-6)
 
 
-def test_run_brakes_before_the_edge(rig: Rig) -> None:
-    rig.go(0.6, 0.5, 2.5)
-    rig.keep_running("0.8,0.8,0.8", 3)
-    pose = rig.pose()
-    assert 0.94 < pose["x"] <= 0.950003
-    assert 0.69 < pose["y"] <= 0.700003
-    assert rig.status() in (Status.IDLE, Status.MOVING)
-
-
 @pytest.mark.parametrize(
     ("command", "status"),
     [
@@ -77,15 +68,6 @@ def test_faults_stop_the_rig_and_have_a_status(rig: Rig, command: str, status: S
     rig.run(0.6)
     assert not rig.pose()["moves"]
     assert rig.speed() < 1e-3
-
-
-def test_a_byte_that_the_receiver_loses_voids_its_line(rig: Rig) -> None:
-    rig.command("lose")
-    assert rig.send_line("$RUN:0.1,0,0") == [f"$ERROR:{int(Error.DAMAGED)}"]
-    rig.run(0.2)
-    assert rig.extremes()["way"] == [0, 0, 0]
-    assert rig.command("overruns")[0]["overruns"] == 1
-    assert rig.status() == Status.IDLE
 
 
 def test_opening_the_port_resets_the_controller_and_the_position_stays(rig: Rig) -> None:

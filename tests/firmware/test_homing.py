@@ -51,21 +51,6 @@ def test_home_is_found_from_anywhere_though_switches_bounce(bench_program: Path,
         assert bench.status() == Status.IDLE
 
 
-def test_rotors_jump_when_drivers_reset(bench: Bench) -> None:
-    """A driver's electrical angle is 0 after its reset, up to two full steps away."""
-    bench.go(0.0003, 0.0001, 0.5)
-    before = bench.pose()
-    bench.send_line("$CALIBRATE")
-    bench.run(0.09)
-    after = bench.pose()
-    jumps = [abs(after[axis] - before[axis]) / (128 * MICROSTEP[axis]) for axis in ("x", "y", "yaw")]
-    assert 0.5 < max(jumps) < 4.5
-    bench.until(Status.IDLE)
-    bench.run(0.3)
-    assert bench.is_true()
-    assert bench.happened("slip") == []
-
-
 @pytest.mark.parametrize("beyond", [1, 3, 9, 20])
 def test_a_rotor_may_stand_between_two_poles_when_drivers_reset(bench: Bench, beyond: int) -> None:
     """So it falls to either side, and has to rest there before the field sets off, or it loses a turn of four steps."""
@@ -75,15 +60,6 @@ def test_a_rotor_may_stand_between_two_poles_when_drivers_reset(bench: Bench, be
     bench.run(0.3)
     assert bench.is_true()
     assert bench.happened("slip") == []
-
-
-def test_y1_and_y2_are_square_afterwards(fresh: Bench) -> None:
-    fresh.command("push y1 12")
-    fresh.run(0.1)
-    assert abs(fresh.pose()["skew"]) > 0.003
-    fresh.calibrate()
-    fresh.run(0.3)
-    assert abs(fresh.pose()["skew"]) <= MICROSTEP["y"]
 
 
 def test_a_pair_that_is_far_from_square_is_not_torn_on(fresh: Bench) -> None:
@@ -200,16 +176,6 @@ def test_a_reset_does_not_trust_a_position_that_is_void(bench: Bench, what: str)
     assert bench.status() == Status.NOT_CALIBRATED
 
 
-@pytest.mark.parametrize("motor", ["x", "y1", "y2", "alpha"])
-def test_a_reset_does_not_take_up_a_part(bench: Bench, motor: str) -> None:
-    """The other three drivers know where they are."""
-    bench.command(f"short {motor}")
-    bench.run(0.1)
-    bench.command("restart")
-    bench.run(0.1)
-    assert bench.status() == Status.NOT_CALIBRATED
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize("line", ["$RUN:0.2,0,0", "$GOTO:0.3,0,0"])
 @pytest.mark.parametrize("notice", ["$STOP", "$CALIBRATE"])
@@ -225,9 +191,3 @@ def test_after_a_reset_nobody_continues_unaware(bench: Bench, line: str, notice:
     bench.send_line(notice)
     bench.until(Status.IDLE)
     assert bench.send_line(line) == []
-
-
-def test_a_start_without_a_position_needs_no_stop(fresh: Bench) -> None:
-    fresh.command("restart")
-    fresh.calibrate()
-    fresh.go(-0.5, -0.5, 0)

@@ -66,12 +66,6 @@ def test_run_brakes_before_the_edge(bench: Bench, axis: str, sign: str) -> None:
     assert bench.events[before:] == []
 
 
-def test_run_leaves_the_edge(bench: Bench) -> None:
-    bench.go(0.95, 0, 0)
-    bench.keep_running("-0.2,0,0", 1)
-    assert bench.pose()["vx"] == pytest.approx(-0.2, rel=0.02)
-
-
 def test_a_sudden_turn_towards_the_edge_stays_inside(bench: Bench) -> None:
     bench.go(0.93, 0, 0)
     bench.keep_running("-0.1,0,0", 0.3)
@@ -159,22 +153,6 @@ def test_a_switch_hit_while_the_axis_turns_is_left_the_way_it_came(bench: Bench,
     assert bench.happened("crash") == []
 
 
-def test_a_switch_hit_at_speed_while_the_rig_is_commanded_back_blocks_both_ways(bench: Bench) -> None:
-    bench.go(0.5, 0, 0)
-    miscount(bench, "x", True, 0.2)
-    while bench.pose()["x"] < 0.76:
-        bench.keep_running("0.5,0,0", 0.02, every=0.02)
-    run_until_limit(bench, "$RUN:-0.5,0,0", patience=1)
-    bench.run(0.5)
-    bench.send_line("$STOP")
-    bench.extremes()
-    for line in ("$RUN:0.3,0,0", "$RUN:-0.3,0,0", "$GOTO:0,0,0"):
-        assert bench.send_line(line) == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
-    bench.run(0.5)
-    assert bench.extremes()["way"] == [0, 0, 0]
-    assert bench.happened("crash") == []
-
-
 @pytest.mark.parametrize("motor", ["x", "y1", "y2", "alpha"])
 def test_a_switch_that_is_stuck_closed_lets_nothing_move(bench: Bench, motor: str) -> None:
     """Both ends share an input, so a stuck switch guards neither: CALIBRATE tries to leave it, and then gives up."""
@@ -207,18 +185,5 @@ def test_a_rig_whose_counter_is_wrong_is_caught_by_its_switch(bench: Bench, axis
     bench.run(0.3)
     assert not bench.pose()["moves"]
     assert bench.happened("crash") == []
-    bench.send_line("$STOP")
-    assert bench.status() == Status.NOT_CALIBRATED
-
-
-def test_a_pair_that_is_not_square_stops(bench: Bench) -> None:
-    """A driver that restarted counts from 0."""
-    bench.keep_running("0,0.2,0", 0.5)
-    bench.command("short y2")
-    bench.run(0.1)
-    assert bench.status() == Status.FAULT
-    pose = bench.pose()
-    assert abs(pose["skew"]) < 0.005
-    assert abs(pose["vy"]) < 0.005
     bench.send_line("$STOP")
     assert bench.status() == Status.NOT_CALIBRATED

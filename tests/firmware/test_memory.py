@@ -60,10 +60,6 @@ def tight(bench_program: Path) -> Iterator[Bench]:
         yield bench
 
 
-def test_without_a_memory_the_built_in_limits_hold(fresh: Bench) -> None:
-    assert kept(fresh) == (pytest.approx(WIDEST), Source.BUILT)
-
-
 @pytest.mark.parametrize("which", range(len(LIMITS)), ids=list(LIMITS))
 def test_limits_beyond_what_is_built_are_refused(fresh: Bench, which: int) -> None:
     for limit in (WIDEST[which] + 1e-6, NARROWEST[which] - 1e-6, 0.0, -1.0):
@@ -151,13 +147,6 @@ def test_limits_outlast_a_reset_with_the_position(tight: Bench) -> None:
     tight.send_line("$STOP")
     assert tight.status() == Status.IDLE
     assert tight.send_line("$RUN:0.41,0,0") == [f"$ERROR:{int(Error.BOUNDS)}"]
-
-
-def test_the_widest_limits_can_be_kept_and_are_the_built_in_ones(fresh: Bench) -> None:
-    keep(fresh, TIGHT)
-    keep(fresh, WIDEST)
-    fresh.calibrate()
-    fresh.go(*(BOUNDS[axis][1] for axis in ("x", "y")), BOUNDS["yaw"][1])
 
 
 @pytest.mark.parametrize("before", [None, OTHER], ids=["none", "others"])

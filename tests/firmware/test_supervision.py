@@ -44,14 +44,6 @@ def test_a_pair_whose_counters_part_stops_and_is_void(bench: Bench) -> None:
     assert bench.status() == Status.NOT_CALIBRATED
 
 
-def test_heat_that_lasts_comes_back(bench: Bench) -> None:
-    bench.command("heat x warm")
-    bench.run(0.01)
-    bench.send_line("$STOP")
-    bench.run(0.01)
-    assert bench.status() == Status.HOT
-
-
 def test_motors_without_supply_are_a_fault_until_they_have_it_and_are_calibrated(bench: Bench) -> None:
     bench.keep_running("0.2,0.1,0", 0.5)
     bench.command("motors off")
@@ -68,15 +60,6 @@ def test_motors_without_supply_are_a_fault_until_they_have_it_and_are_calibrated
     bench.calibrate()
     bench.go(0.1, 0.1, 0.1)
     assert bench.is_true()
-
-
-def test_the_first_trouble_is_what_status_says(bench: Bench) -> None:
-    bench.keep_running("0.2,0,0", 0.6)
-    bench.command("switch x closed")
-    bench.run(0.05)
-    bench.command("heat y1 hot")
-    bench.run(0.05)
-    assert bench.status() == Status.LIMIT
 
 
 def test_a_hard_stop_from_high_speed_voids_the_position(bench: Bench) -> None:
@@ -101,15 +84,6 @@ def test_stop_does_not_hide_what_voids_the_position(bench: Bench, motor: str, co
     if command.startswith("push"):
         bench.command("pass 0.0005")
     bench.send_line("$STOP")
-    assert bench.status() == Status.NOT_CALIBRATED
-
-
-def test_stop_does_not_hide_a_dip_of_the_supply(bench: Bench) -> None:
-    bench.command("motors off")
-    bench.command("motors on")
-    bench.send_line("$STOP")
-    assert bench.status() == Status.NOT_CALIBRATED
-    bench.run(0.1)
     assert bench.status() == Status.NOT_CALIBRATED
 
 

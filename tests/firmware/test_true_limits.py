@@ -7,7 +7,7 @@ import pytest
 from services.gantry.memory import wanted
 from services.gantry.motion import AxisConstants, Conversion
 from services.gantry.protocol import Position
-from services.gantry.rig_table import BOUNDS, CIRCLE_OFFSET, CIRCLE_STEPS, LIMITS, OFFSETS, STEPS
+from services.gantry.rig_table import BOUNDS, CIRCLE_OFFSET, CIRCLE_STEPS, OFFSETS, STEPS
 from tests.firmware.programs import CIRCLE_ELF, Rig
 
 X, Y, YAW, SPEED, RATE = 0.5, 0.4, 0.7, 0.3, 0.8
@@ -74,8 +74,3 @@ def test_the_yaw_of_a_circle_goes_to_true_headings(firmware: None) -> None:
             assert abs(math.degrees(off)) < 0.1
             reported = conversion.to_true(Position(*rig.position()))
             assert math.remainder(reported.yaw - rig.pose()["yaw"], math.tau) == pytest.approx(0, abs=3e-4)
-
-
-def test_without_measured_constants_nothing_is_converted() -> None:
-    widest = {name: most for name, (_, most) in LIMITS.items()}
-    assert wanted(None, Conversion()) == widest == wanted(None, measured((1, 1, 1), (0, 0, 0)))

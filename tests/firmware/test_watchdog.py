@@ -19,14 +19,6 @@ def test_silence_begins_braking_after_500_ms(bench: Bench) -> None:
     assert bench.extremes()["ramp"][0] <= 0.5
 
 
-@pytest.mark.parametrize("velocity", ["0,0.2,0", "0,0,0.4", "-0.2,0,0"])
-def test_silence_brakes_every_axis(bench: Bench, velocity: str) -> None:
-    bench.keep_running(velocity, 0.6)
-    bench.run(1.5)
-    assert not bench.pose()["moves"]
-    assert bench.status() == Status.WATCHDOG
-
-
 def test_each_run_counts_anew(bench: Bench) -> None:
     bench.keep_running("0.1,0,0", 3, every=0.45)
     assert bench.status() == Status.MOVING
@@ -50,13 +42,6 @@ def test_run_waits_for_stop_afterwards(bench: Bench) -> None:
     bench.send_line("$STOP")
     assert bench.status() == Status.IDLE
     assert bench.send_line("$RUN:0.1,0,0") == []
-
-
-def test_goto_acknowledges_it(bench: Bench) -> None:
-    bench.keep_running("0.1,0,0", 0.3)
-    bench.run(1)
-    bench.go(0.2, 0.2, 0)
-    assert bench.status() == Status.IDLE
 
 
 @pytest.mark.parametrize("line", ["$GOTO:0.9,0.7,2.9", "$CALIBRATE"])
@@ -108,15 +93,6 @@ def test_a_line_with_a_mistake_is_nobody(bench: Bench, motion: str, line: str) -
     assert bench.status() == Status.WATCHDOG
 
 
-@pytest.mark.thorough
-def test_calibrate_without_anybody_is_not_calibrated(bench: Bench) -> None:
-    bench.send_line("$CALIBRATE")
-    bench.run(2)
-    assert bench.send_line("$GOTO:0,0,0") == [f"$ERROR:{int(Error.UNCALIBRATED)}"]
-    bench.calibrate()
-    bench.go(0, 0, 0)
-
-
 WRAPS = [0.02, 0.25, 0.49]
 """s after the last line in which the clock of milliseconds wraps."""
 
@@ -133,13 +109,6 @@ def test_silence_is_noticed_in_time_while_the_clock_wraps(bench: Bench, wraps: f
     bench.run(0.03)
     assert bench.status() == Status.WATCHDOG
     assert bench.pose()["vx"] < 0.295
-
-
-@pytest.mark.parametrize("wraps", WRAPS)
-def test_a_run_lives_on_while_the_clock_wraps(bench: Bench, wraps: float) -> None:
-    bench.command(f"wraps {wraps}")
-    bench.keep_running("0.1,0,0", 2, every=0.4)
-    assert bench.status() == Status.MOVING
 
 
 @pytest.mark.slow

@@ -13,11 +13,10 @@ from services.base import Flags
 from services.base.flags import load_manifest, parse
 from services.gantry import manual
 from services.gantry.link import PortError
-from services.gantry.manual import find_home
 from services.gantry.memory import conversion_of, kept_limits, motion_limits, true_box
 from services.gantry.motion import BUILT_IN, FARTHEST, HOME, AxisConstants, Conversion, MotionLimits, box
 from services.gantry.protocol import Position
-from services.gantry.rig_table import CIRCLE_YAW, MICROSTEP
+from services.gantry.rig_table import CIRCLE_YAW
 from tests.services.gantry.fake_rig import FakeRig
 
 FOLDER = Path(manual.__file__).parent
@@ -34,10 +33,6 @@ def test_what_is_built_in_converts_to_itself_exactly() -> None:
     assert Conversion().to_firmware(place) == Conversion().to_true(place) == place
     assert box(1.9, 1.4, math.radians(170)) == (HOME, FARTHEST) == (MotionLimits().low, MotionLimits().high)
     assert Conversion().steps(Position(0, 0, math.radians(1))) == pytest.approx({"x": 2988, "y": 2324, "yaw": 83.55})
-
-
-def test_microsteps_are_those_of_the_firmware() -> None:
-    assert {axis: 1 / 128 / one.steps for axis, one in BUILT_IN.items()} == pytest.approx(MICROSTEP)
 
 
 @given(st.floats(-0.9, 0.95))
@@ -125,12 +120,6 @@ def test_the_yaw_of_a_circle_has_an_offset_only() -> None:
     for words in (("--kind=circle", "--steps-yaw=0.55"), ("--kind=circle", "--offset-yaw=83"), ("--offset-yaw=100",)):
         with pytest.raises(PortError, match=r"circle has no steps|expected 89 to 111|expected 72 to 94"):
             conversion_of(flags_of(*words))
-
-
-def test_a_circle_at_its_index_by_measured_constants() -> None:
-    conversion = conversion_of(flags_of("--kind=circle", "--offset-yaw=105"))
-    at = find_home(motion_limits(flags_of("--kind=circle", "--offset-yaw=105")), conversion)
-    assert abs(conversion.to_firmware(at).yaw) == pytest.approx(math.pi) and math.degrees(at.yaw) == pytest.approx(171)
 
 
 def test_manual_moves_to_true_places_and_says_the_steps(tmp_path: Path) -> None:

@@ -39,13 +39,6 @@ def test_a_rig_that_is_not_calibrated_has_a_status_and_no_position(line: "tuple[
     assert at is not None and (at.x, status) == (0.1, Status.IDLE)
 
 
-@pytest.mark.thorough
-def test_a_home_that_is_not_where_it_was_fails_with_its_axis(line: "tuple[FakeRig, Link]") -> None:
-    """Homing takes the same time from everywhere, as if the switch moved with the rig."""
-    with pytest.raises(RigError, match=r"^homing x is .* mm, expected at most 5$"):
-        run_checks(line[1], MotionLimits(), wanted(None, Conversion()), 5.0)
-
-
 def test_an_old_fault_fails_and_is_not_erased(line: "tuple[FakeRig, Link]") -> None:
     rig, link = line
     rig.status = int(Status.STALL)

@@ -25,20 +25,6 @@ def manual(rig: FakeRig, *words: str, code: int = 0) -> dict[str, Any]:
     return result
 
 
-def test_status_moves_nothing(rig: FakeRig) -> None:
-    result = manual(rig, "status")
-    assert (result["status"], result["word"], result["x"], result["y"]) == (0, "idle", 0.1, -0.1)
-    assert not rig.commands("GOTO") and not rig.commands("CALIBRATE") and rig.last() == "STOP"
-
-
-@pytest.mark.thorough
-def test_it_goes_and_stops_at_the_end(rig: FakeRig) -> None:
-    result = manual(rig, "goto", "-0.5", "0.25", "90")
-    assert [result["x"], result["y"], result["yaw"]] == pytest.approx([-0.5, 0.25, 90], abs=0.01)
-    assert rig.last() == "STOP"
-    assert manual(rig, "home")["x"] == pytest.approx(-0.9, abs=0.01)
-
-
 @pytest.mark.parametrize("words", [("goto", "2", "0", "0"), ("--range-x=0.5", "goto", "0", "0", "0")])
 def test_out_of_the_ranges_nothing_moves(rig: FakeRig, words: tuple[str, ...]) -> None:
     assert "out of the rig's ranges" in manual(rig, *words, code=2)["error"]

@@ -1,19 +1,16 @@
 """The limits of the rig's file in its memory: agreed upon before anything moves."""
 
-import json
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from services.gantry import manual, memory
+from services.gantry import memory
 from services.gantry.link import Link, PortError, RigError, SerialPort
-from services.gantry.manual import run_checks
 from services.gantry.memory import agree, wanted
-from services.gantry.motion import Conversion, MotionLimits
+from services.gantry.motion import Conversion
 from services.gantry.protocol import Limits, answer
-from services.gantry.rig_table import CIRCLE_YAW, LIMITS, Source
+from services.gantry.rig_table import LIMITS, Source
 from tests.services.built import built, refusal
 from tests.services.gantry.fake_rig import FakeRig
 
@@ -144,39 +141,6 @@ def test_the_service_writes_them_when_it_calibrates(line: tuple[FakeRig, Link]) 
         assert limits.high.x == pytest.approx(0.3)
     order = words(rig)
     assert order.index("SETLIMITS") < order.index("CALIBRATE") < order.index("GOTO")
-
-
-@pytest.mark.thorough
-def test_by_hand_they_are_written_by_calibrate_and_shown_by_status(
-    line: tuple[FakeRig, Link], capsys: pytest.CaptureFixture[str]
-) -> None:
-    rig, _ = line
-    flags = [f"--serial={rig.path}", "--limits=speed=0.4"]
-    assert manual.main([*flags, "goto", "0", "0", "0"], sys.stdout) == 1
-    assert "calibrate it" in json.loads(capsys.readouterr().out)["error"] and not MOVES & set(words(rig))
-    assert manual.main([*flags, "calibrate"], sys.stdout) == 0
-    capsys.readouterr()
-    assert manual.main([*flags, "status"], sys.stdout) == 0
-    shown = json.loads(capsys.readouterr().out)["limits"]
-    assert (shown["speed"], shown["x"], shown["from"]) == (0.4, 1.85, "kept")
-
-
-@pytest.mark.thorough
-def test_the_health_check_writes_them_first(line: tuple[FakeRig, Link], monkeypatch: pytest.MonkeyPatch) -> None:
-    rig, link = line
-    monkeypatch.setattr("services.gantry.manual._differences", lambda *_: [0.0])
-    run_checks(link, MotionLimits(), wanted(TEXT, Conversion()), 5.0)
-    order = words(rig)
-    assert order.index("SETLIMITS") < order.index("CALIBRATE")
-
-
-def test_a_yaw_without_end_has_no_limit(line: tuple[FakeRig, Link]) -> None:
-    rig, link = line
-    rig.turn, link.conversion = True, Conversion(circle=True)
-    agree(link, wanted(None, Conversion(circle=True)), write=True)
-    assert "SETLIMITS" not in words(rig)
-    agree(link, wanted("speed=0.4", Conversion(circle=True)), write=True)
-    assert rig.memory[2] == CIRCLE_YAW
 
 
 def test_a_firmware_that_says_nothing_of_its_limits_is_an_error(

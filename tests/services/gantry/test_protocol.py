@@ -106,14 +106,6 @@ def test_noise_before_an_answer_does_not_hide_it(noise: bytes, sent: Answer) -> 
     assert len(found) == 1 and same(found[0], sent)
 
 
-@given(st.lists(st.binary(max_size=150), max_size=10))
-def test_any_bytes_are_survived_and_the_next_answer_is_read(parts: list[bytes]) -> None:
-    lines = LineReader()
-    for part in parts:
-        lines.feed(part)
-    assert lines.feed(b"\n" + line(Status.MOVING))[-1] == Status.MOVING
-
-
 def test_a_line_without_end_is_dropped_whole() -> None:
     lines = LineReader()
     for _ in range(10):
