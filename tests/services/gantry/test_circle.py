@@ -22,7 +22,6 @@ LIMITS = MotionLimits(low=LOW, high=HIGH)
 @pytest.fixture
 def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[FakeRig, Link]]:
     monkeypatch.setattr(manual, "ROUNDS", 3)
-    monkeypatch.setattr(manual, "TRIES", 1)
     monkeypatch.setattr(manual, "REPEATS", dict.fromkeys(("x", "y", "yaw"), 1.0))
     with FakeRig(tmp_path / "rig") as rig:
         rig.turn = True
