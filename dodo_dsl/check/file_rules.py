@@ -292,11 +292,12 @@ def table_span(path: Path, field: str) -> tuple[float, float] | None:
     """When a table of a target begins and ends, in s; None for a recording and a table that cannot be read."""
     if path.suffix == formats.RECORDING:
         return None
-    from dodo_dsl.opendlv.assets import target_table
+    from dodo_dsl.opendlv.assets.table import read_target
+    from dodo_dsl.opendlv.envelope import MICROSECONDS
 
     try:
-        times = [time / target_table.MICROSECONDS for time, _ in target_table.read(path, field)]
-    except target_table.TargetError:
+        times = [time / MICROSECONDS for time, _ in read_target(path, field)]
+    except InputError:
         return None  # reported with the file
     return times[0], times[-1]
 
@@ -329,9 +330,11 @@ def _frames(
 def pictures(path: Path, sender: int, most: int) -> int:
     """How many frames of a camera a recording has, up to so many; so many if it has none, or is damaged."""
     try:
-        return recording_contents.count(path, known_ids(())[IMAGE], sender, most) or most
+        found = recording_contents.contents(path)
     except OSError:
         return most  # reported with the file
+    count = found.counts.get((known_ids(())[IMAGE], sender), 0)
+    return min(count, most) if count and found.is_whole else most
 
 
 def check_limits(context: RuleContext) -> Iterator[Diagnostic]:

@@ -118,10 +118,11 @@ def _is_all_of(other: Port, port: Port) -> bool:
 def holds(path: Path, number: int, stamp: int) -> bool:
     """Whether a recording may hold a message, of any sender for ``_NO_STAMP``."""
     try:
-        found = recording_contents.look(path, number, stamp)
+        found = recording_contents.contents(path)
     except OSError:
         return True  # reported with the file
-    return bool(found.senders if stamp == _NO_STAMP else stamp in found.senders) or not found.is_whole
+    senders = found.senders(number)
+    return bool(senders if stamp == _NO_STAMP else stamp in senders) or not found.is_whole
 
 
 @functools.cache

@@ -4,7 +4,6 @@ A topic with its type is enough where only one source fits. What a test does not
 application runs in others; what could mean several things is an error.
 """
 
-import functools
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -34,7 +33,6 @@ _ROBOT = "base_link"
 _PICTURES = ("argb", "bgr", "rgb")
 """Formats of memories of which topics are made, the best first: every camera has the first."""
 _OWN = {CLOCK: "is always there", **dict.fromkeys(("/tf", STATIC_FRAMES), "has the frames of sensors, and no others")}
-_recorded_size = functools.lru_cache(maxsize=64)(recording_contents.picture_size)
 
 
 @dataclass(frozen=True)
@@ -232,7 +230,7 @@ def _view(each: Resolved) -> CameraView | None:
     texts, arguments = each.maker.texts, each.maker.arguments.values()
     size = int(texts.get("width", 0)), int(texts.get("height", 0))
     played = (a.value.path for a in arguments if a.parameter.format == "recording" and a.value and a.value.path)
-    width, height = size if all(size) else next(map(_recorded_size, played), size)
+    width, height = size if all(size) else next(map(recording_contents.picture_size, played), size)
     format_ = _format(each.bus[0], each.maker) if each.is_picture else ""
     return CameraView(width=width, height=height, fovy=float(texts.get("fovy", 0)), format=format_)
 

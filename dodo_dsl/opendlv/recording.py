@@ -240,8 +240,8 @@ class Recording:
     ``time`` is the sample time, or if that is zero when the message was received, or else sent.
     """
 
-    def __init__(self, path: Path, progress: Callable[[int], None] | None = None) -> None:
-        """Read all of a file once; ``progress`` gets the number of bytes read.
+    def __init__(self, path: Path, progress: Callable[[int], None] | None = None, most: float = float("inf")) -> None:
+        """Read a file once, up to about ``most`` bytes; ``progress`` gets the number of bytes read.
 
         Raises OSError for an unreadable file and for what is none, RecordingError for one without a single message.
         """
@@ -249,8 +249,7 @@ class Recording:
         self._stream: BinaryIO = regular_file.opened(path)
         try:
             self.size = os.fstat(self._stream.fileno()).st_size
-            self.damage, self.index = _indexed(self._stream, progress)
-            self._refuse_others()
+            self.damage, self.index = _indexed(path, self._stream, progress, most)
         except BaseException:
             self._stream.close()
             raise
@@ -317,10 +316,6 @@ class Recording:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _refuse_others(self) -> None:
-        if self.size and not len(self.index):
-            raise RecordingError(f"{self.path} is not a recording: its {self.size} bytes hold no message")
-
     def _gathered(self, rows: Numbers) -> Batch:
         """Read frames that lie near one another with one call."""
         order = np.argsort(self.index["offset"][rows], kind="stable")
@@ -351,7 +346,9 @@ def matching(index: NDArray[np.void], keys: Iterable[tuple[int, int | None]]) ->
     return marks
 
 
-def _indexed(stream: BinaryIO, progress: Callable[[int], None] | None) -> tuple[Damage, NDArray[np.void]]:
+def _indexed(
+    path: Path, stream: BinaryIO, progress: Callable[[int], None] | None, most: float
+) -> tuple[Damage, NDArray[np.void]]:
     scanner = Scanner(stream)
     index = bytearray()  # grows in place, so that there is never a second one
     for batch in scanner.batches():
@@ -366,4 +363,8 @@ def _indexed(stream: BinaryIO, progress: Callable[[int], None] | None) -> tuple[
         index += part.tobytes()
         if progress is not None:
             progress(scanner.position)
+        if scanner.position >= most:
+            break
+    if scanner.position and not index:
+        raise RecordingError(f"{path} is not a recording: its {scanner.position} bytes hold no message")
     return scanner.damage, np.frombuffer(index, _INDEX)

@@ -63,32 +63,6 @@ def read_varint(data: bytes | bytearray | memoryview, position: int) -> tuple[in
     raise WireError(f"the number at byte {position} has no end")
 
 
-def first_number(data: bytes, number: int) -> int:
-    """The first number in a field of a message without fixed sizes; 0 if there is none before damage."""
-    return _first(data, number << 3 | VARINT)[0]
-
-
-def first_message(data: bytes, number: int) -> bytes:
-    """The first message in a field, likewise; empty if there is none."""
-    length, start = _first(data, number << 3 | DELIMITED)
-    return data[start : start + length]
-
-
-def _first(data: bytes, wanted: int) -> tuple[int, int]:
-    """The number or length behind the first of these keys, and the position behind it; fields later are not read."""
-    at = 0
-    try:
-        while at < len(data):
-            key, at = read_varint(data, at)
-            value, at = read_varint(data, at)
-            if key == wanted:
-                return value, at
-            at += value if key & 7 == DELIMITED else 0
-    except WireError:
-        pass
-    return 0, 0
-
-
 def zigzag(value: int) -> int:
     """A number of 32 bits with a sign as one without."""
     return value << 1 ^ value >> 31

@@ -9,7 +9,7 @@ from typing import Any
 
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.assets import map_file
-from dodo_dsl.opendlv.assets.json_file import MapError
+from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.attitude import heading_of
 from dodo_dsl.plan.model import Plan
 
@@ -116,7 +116,7 @@ def read_ground(place: Path) -> Ground:
     try:
         lines = [(name, [(*a, *b) for a, b in each]) for name, each in map_file.read_obstacles(found.path).items()]
         lines += [(name, _edges(each)) for name, each in map_file.footprints(found.blocks).items() if each]
-    except MapError:
+    except InputError:
         lines = []
     moving = tuple(model for model in found.models if model.frames)
     return Ground(models, lines, moving)

@@ -14,9 +14,8 @@ from dodo_dsl.opendlv.assets.trajectory import (
     read_table,
     straight,
 )
+from dodo_dsl.opendlv.envelope import MICROSECONDS
 from services.base import Context, Flags, Output, Service, period_of
-
-MICROSECONDS = 1_000_000
 
 
 class Beacon(Service):

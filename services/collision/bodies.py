@@ -14,8 +14,8 @@ import shapely
 
 from dodo_dsl.opendlv.assets.map_file import bodies, read_map
 from dodo_dsl.opendlv.assets.track import TURN, VehicleBox, VehiclePose, between, corners
+from dodo_dsl.opendlv.envelope import MICROSECONDS
 
-MICROSECONDS = 1_000_000
 HELD = 2 * MICROSECONDS
 """us without a frame of a body, after which it counts as standing where it was last seen."""
 Footprints = Mapping[int, tuple[str, shapely.Geometry]]
@@ -30,7 +30,7 @@ class Approach(NamedTuple):
 
 
 def load_footprints(path: Path, own: int) -> Footprints:
-    """The bodies of a map, without the vehicle's ``own`` one; raises MapError."""
+    """The bodies of a map, without the vehicle's ``own`` one; raises InputError."""
     found = bodies(read_map(path).models, own)
     return {
         stamp: (name, shapely.convex_hull(shapely.MultiPoint(model.footprint())))

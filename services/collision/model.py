@@ -27,10 +27,9 @@ from dodo_dsl.opendlv.assets.track import (
     told,
     touched,
 )
+from dodo_dsl.opendlv.envelope import MICROSECONDS
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.collision.bodies import Approach, Footprints, OtherBody
-
-MICROSECONDS = 1_000_000
 
 
 @dataclass

@@ -92,7 +92,7 @@ def _port(text: str, context: Context) -> tuple[str, int | None]:
 
 
 def _bodies(flags: Flags) -> Footprints:
-    """The bodies that the flags ask for; raises MapError, and ValueError if there are none."""
+    """The bodies that the flags ask for; raises InputError, and ValueError if there are none."""
     if not flags["bodies"]:
         if flags["min-body-margin"]:
             raise ValueError("--min-body-margin needs --bodies")

@@ -13,10 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dodo_dsl.opendlv.envelope import MICROSECONDS
 from services.base import Check
 from services.base.evaluator import EARLY, Hidden
 from services.base.service import at_limit
-from services.continuous_signal.target import MICROSECONDS, Target, Times, Values
+from services.continuous_signal.target import Target, Times, Values
 
 DAY = 86_400 * MICROSECONDS
 

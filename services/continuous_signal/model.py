@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dodo_dsl.opendlv.envelope import MICROSECONDS
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.base.evaluator import EARLY, Hidden
 from services.base.judged import FAILED, MOST_SAMPLES, WARNED
@@ -20,7 +21,7 @@ from services.continuous_signal.measures import (
     judged_time,
     measure,
 )
-from services.continuous_signal.target import MICROSECONDS, Target, Times, Values, in_order
+from services.continuous_signal.target import Target, Times, Values, in_order
 
 _NAMES = {
     "mean": "the mean distance",

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from dodo_dsl.opendlv.envelope import MICROSECONDS
 from dodo_dsl.opendlv.message_set import MessageSet
 from services.base import Context, Flags, Share
 from services.base.service import SINGLE
 from services.continuous_signal.measures import SignalLimits
 from services.continuous_signal.model import SignalEvaluator
 from services.continuous_signal.target import (
-    MICROSECONDS,
     Signal,
     Target,
     Times,

@@ -14,13 +14,11 @@ from google.protobuf.descriptor import FieldDescriptor
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv import recording_times
-from dodo_dsl.opendlv.assets import target_table
-from dodo_dsl.opendlv.assets.target_table import MICROSECONDS, TargetError
-from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.assets.problem import InputError
+from dodo_dsl.opendlv.assets.table import read_target
+from dodo_dsl.opendlv.envelope import MICROSECONDS, Envelope
 from dodo_dsl.opendlv.message_set import OWN_IDS, MessageError, MessageSet
 from dodo_dsl.opendlv.recording import Recording, RecordingError
-
-__all__ = ["MICROSECONDS", "Target", "TargetError", "Times", "Values", "in_order"]
 
 Times = NDArray[np.int64]
 """Microseconds."""
@@ -62,9 +60,9 @@ def in_order(times: Times, values: Values, start: int = 0) -> Target:
 def read_table(path: Path, field: str, from_first: bool) -> Target:
     """The target in a table: the column named `field`, or else `value`, over `time`.
 
-    Times count from zero, or `from_first` row on. Raises TargetError.
+    Times count from zero, or `from_first` row on. Raises InputError.
     """
-    samples = target_table.read(path, field)
+    samples = read_target(path, field)
     times = np.array([time for time, _ in samples], np.int64)
     start = int(times[0]) if from_first else 0
     return Target(times - start, np.array([value for _, value in samples]), start)
@@ -109,7 +107,7 @@ def is_single(signal: Signal, messages: MessageSet) -> bool:
 
 
 def read_recording(path: Path, signal: Signal, messages: MessageSet) -> Target:
-    """The target in a `.rec` file, its times from the first of all its messages. Raises TargetError.
+    """The target in a `.rec` file, its times from the first of all its messages. Raises InputError.
 
     Messages are put in the order of their times; of those with one and the same time the last counts.
     """
@@ -122,15 +120,15 @@ def read_recording(path: Path, signal: Signal, messages: MessageSet) -> Target:
             if not len(rows):
                 senders = np.unique(index["sender_stamp"][index["data_type"] == id_]).tolist()
                 found = f", but of {', '.join(map(str, senders))}" if senders else ""
-                raise TargetError(f"{path}: has no {signal.message} of sender {signal.sender}{found}")
+                raise InputError(path, f"has no {signal.message} of sender {signal.sender}{found}")
             if fault := recording_times.fault(recording, others) or recording_times.fault(recording, rows):
-                raise TargetError(f"{path} cannot be a target: {fault}")
+                raise InputError(path, f"cannot be a target: {fault}")
             times, first = index["time"][rows], int(recording_times.within(recording, others).min())
             return in_order(times - first, _values(path, list(recording.envelopes(rows)), signal, messages), first)
     except OSError as error:
-        raise TargetError(f"{path}: cannot be read as a recording: {error.strerror}") from None
+        raise InputError(path, f"cannot be read as a recording: {error.strerror}") from None
     except RecordingError as error:
-        raise TargetError(str(error)) from None
+        raise InputError(path, str(error).removeprefix(f"{path} ")) from None
 
 
 def picture_times(path: Path, sender: int, start: int) -> Times | None:
@@ -152,11 +150,11 @@ def due_times(path: Path, sender: int, start: float, end: float | None, timemod:
 def _values(path: Path, envelopes: list[Envelope], signal: Signal, messages: MessageSet) -> Values:
     values = np.empty(len(envelopes))
     for number, envelope in enumerate(envelopes):
-        place = f"{path}: {signal} number {number + 1}"
+        place = f"{signal} number {number + 1}"
         try:
             values[number] = signal.value(messages.decode(envelope.data_type, envelope.payload))
         except MessageError as error:
-            raise TargetError(f"{place}: {error}") from None
+            raise InputError(path, f"{place}: {error}") from None
         if not np.isfinite(values[number]):
-            raise TargetError(f"{place}: {signal.field} is {values[number]}, expected a finite number")
+            raise InputError(path, f"{place}: {signal.field} is {values[number]}, expected a finite number")
     return values

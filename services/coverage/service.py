@@ -44,7 +44,7 @@ def build(context: Context) -> Coverage:
 
 
 def _area(flags: Flags) -> shapely.Geometry:
-    """The loop of the map, or the rectangle; raises MapError, and ValueError for what is not an area."""
+    """The loop of the map, or the rectangle; raises InputError, and ValueError for what is not an area."""
     name, path, sides = flags["area"], flags["map-path"], [flags[side] for side in _SIDES]
     if (name is None) == (sides == [None] * len(_SIDES)):
         raise ValueError("give the area either as a loop of the map, --area, or as a rectangle, --x-min and so on")

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 from dodo_dsl.opendlv.assets.car import KIWI, Car
+from dodo_dsl.opendlv.envelope import MICROSECONDS
 
-MICROSECONDS = 1_000_000
 LONGEST = 5_000
 """Microseconds: no step of the equations is longer, however seldom the model is updated."""
 STEERING, PEDAL = "steering", "pedal"

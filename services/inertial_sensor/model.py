@@ -6,7 +6,7 @@ SI units. Body: x forward, y left, z up; world: z up. Vectors are tuples, and ro
 import math
 from dataclasses import dataclass
 
-MICROSECONDS = 1_000_000
+from dodo_dsl.opendlv.envelope import MICROSECONDS
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]

@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 from dodo_dsl.opendlv.attitude import Quaternion, heading_of
+from dodo_dsl.opendlv.envelope import MICROSECONDS
 
 Vector = tuple[float, float, float]
 
@@ -94,7 +95,6 @@ def _sum(v: Vector, *terms: tuple[float, Vector]) -> Vector:
     return x, y, z
 
 
-MICROSECONDS = 1_000_000
 AHEAD = 1_000_000  # us; a stamp further ahead than this is of another clock
 
 

@@ -27,7 +27,7 @@ class LidarService(Service):
 
 
 def build(context: Context) -> LidarService:
-    """The service from its flags; raises MapError and ValueError."""
+    """The service from its flags; raises InputError and ValueError."""
     flags = context.flags
     near, far = flags["min-range"], flags["max-range"]
     if near >= far:

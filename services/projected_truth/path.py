@@ -7,11 +7,11 @@ from bisect import bisect_left
 from collections import deque
 from operator import itemgetter
 
+from dodo_dsl.opendlv.envelope import MICROSECONDS
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from services.scene.camera import LONGEST_GAP, CameraPose, motion_between, still
 
 _KEPT = 256
-MICROSECONDS = 1_000_000
 _GAP = round(LONGEST_GAP * MICROSECONDS)
 
 _time = itemgetter(0)

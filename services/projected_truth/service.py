@@ -9,8 +9,9 @@ from pathlib import Path
 
 import cv2
 
+from dodo_dsl.opendlv.envelope import MICROSECONDS
 from services.base import Context, Flags, Output, Service
-from services.projected_truth.path import MICROSECONDS, FollowedMemory, MeasuredPath
+from services.projected_truth.path import FollowedMemory, MeasuredPath
 from services.scene.camera import CameraFrame, CameraPose, Pinhole, body_pose, mount
 from services.scene.lens import Alignment, Distortion, Lens, lens_of
 from services.scene.render import Renderer
@@ -98,7 +99,7 @@ class ProjectedTruth(Service):
 
 
 def build(context: Context) -> Service:
-    """The service from its flags; raises MapError and ValueError."""
+    """The service from its flags; raises InputError and ValueError."""
     flags = context.flags
     if context.clock.relays:
         raise ValueError("a rig does not wait, so this is for real time; in lockstep virtual-camera has a truth-sender")

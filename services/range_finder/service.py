@@ -33,7 +33,7 @@ class RangeFinderService(Service):
 
 
 def build(context: Context) -> Service:
-    """The service from its flags; raises MapError and ValueError."""
+    """The service from its flags; raises InputError and ValueError."""
     flags = context.flags
     outlines = Outlines(Path(flags["map-path"]), flags["walls"], flags["frame-id"], flags["not-walls"])
     model = RangeFinder(outlines, sensors_of(flags), device_of(flags), flags["seed"])

@@ -15,7 +15,6 @@ from dodo_dsl.opendlv.message_set import MessageError, MessageSet, UnknownMessag
 from dodo_dsl.opendlv.recording import Recording, matching
 
 IMAGE = 1055
-MICROSECONDS = 1_000_000
 
 
 class SelectionError(ValueError):

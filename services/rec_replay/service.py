@@ -11,13 +11,14 @@ import numpy as np
 from google.protobuf.message import Message
 
 from dodo_dsl.opendlv import message_versions, pixels
+from dodo_dsl.opendlv.envelope import MICROSECONDS
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.recording_times import DAY
 from services.base import Context, Service
 from services.base.loop import TEST_BEGIN
 from services.base.service import Framed, Output, period_of
-from services.rec_replay.selection import IMAGE, MICROSECONDS, Part, Player, Selection, SelectionError, select
+from services.rec_replay.selection import IMAGE, Part, Player, Selection, SelectionError, select
 from services.rec_replay.stream import EntryStream, PictureMemories, first_frame
 
 LOOKS_HZ = 1000.0

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dodo_dsl.opendlv.assets import mesh_text
-from dodo_dsl.opendlv.assets.json_file import MapError
+from dodo_dsl.opendlv.assets.problem import InputError
 from services.scene.camera import Array
 from services.scene.raster import Image
 from services.scene.textures import Texture, load_picture
@@ -84,19 +84,19 @@ def oriented(vertices: Array, triangles: Indices) -> Indices:
 
 
 def _loaded(path: Path, mesh: mesh_text.Mesh) -> tuple[Array, Indices, Indices]:
-    """Vertices, triangles and the number of each one's face; MapError when there is nothing to draw."""
+    """Vertices, triangles and the number of each one's face; InputError when there is nothing to draw."""
     triangles, faces = (np.array(each, np.intp) for each in mesh.triangles())
     vertices, triangles = with_fewer_sides(*weld(np.array(mesh.vertices), triangles))
     has_corners = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
     triangles, faces = oriented(vertices, triangles[has_corners]), faces[has_corners]
     has_area = have_area(vertices, triangles)
     if not has_area.any():
-        raise MapError(path, "no face of the OBJ file has an area")
+        raise InputError(path, "no face of the OBJ file has an area")
     return vertices, triangles[has_area], np.resize(faces, len(triangles))[has_area]
 
 
 def load_obj(path: Path) -> tuple[Array, Indices]:
-    """Vertices (V, 3) in m and triangles (T, 3) of an OBJ file; MapError when there is nothing to draw."""
+    """Vertices (V, 3) in m and triangles (T, 3) of an OBJ file; InputError when there is nothing to draw."""
     vertices, triangles, _ = _loaded(path, mesh_text.read(path))
     return vertices, triangles
 

@@ -243,7 +243,7 @@ class Mesh:
 
     @classmethod
     def load(cls, file: Path) -> Self:
-        """Raises MapError."""
+        """Raises InputError."""
         vertices, triangles = load_obj(file)
         return cls(vertices, triangles, is_closed(vertices, triangles))
 
@@ -265,7 +265,7 @@ class Outlines:
     ) -> None:
         """``walls`` are obstacles whose lines stop rays, ``*`` for all but ``not_walls``.
 
-        The model at the frame ``own`` is the vehicle itself, which its sensors do not see. Raises MapError.
+        The model at the frame ``own`` is the vehicle itself, which its sensors do not see. Raises InputError.
         """
         self._map: MapFile = read_map(path)
         every = [name for name in read_obstacles(self._map.path) if name not in not_walls] if EVERY in walls else []

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from dodo_dsl.opendlv.assets import map_file
-from dodo_dsl.opendlv.assets.json_file import MapError
 from dodo_dsl.opendlv.assets.map_file import (
     BlockEntry,
     Line,
@@ -24,6 +23,7 @@ from dodo_dsl.opendlv.assets.map_file import (
     find_map,
     read_map,
 )
+from dodo_dsl.opendlv.assets.problem import InputError
 from services.scene.bodies import Copies
 from services.scene.camera import Array
 from services.scene.meshes import load_obj, load_painted
@@ -39,12 +39,12 @@ THICKNESS = 0.0002
 
 
 def picked_lines(path: Path, names: Sequence[str]) -> list[Line]:
-    """The lines of a map's obstacles with these names; MapError when one is not there."""
+    """The lines of a map's obstacles with these names; InputError when one is not there."""
     known = map_file.read_obstacles(find_map(path)) if names else {}
     for name in names:
         if name not in known:
             have = ", ".join(sorted(known)) or "none"
-            raise MapError(find_map(path), f"there is no obstacle '{name}' with lines; the map has {have}")
+            raise InputError(find_map(path), f"there is no obstacle '{name}' with lines; the map has {have}")
     return [line for name, lines in known.items() if name in names for line in lines]
 
 
@@ -173,7 +173,7 @@ def _bgr(colour: Vector3) -> Array:
 
 @dataclass
 class _Budget:
-    """What the meshes and textures of one map may take together; ``take`` raises MapError."""
+    """What the meshes and textures of one map may take together; ``take`` raises InputError."""
 
     path: Path
     most: int
@@ -183,7 +183,7 @@ class _Budget:
     def take(self, amount: int) -> None:
         self.taken += amount
         if self.taken > self.most:
-            raise MapError(self.path, f"more than {self.most} {self.what} in all")
+            raise InputError(self.path, f"more than {self.most} {self.what} in all")
 
 
 def _models(
@@ -255,7 +255,7 @@ def _faces(entries: MapFile, options: SceneOptions) -> Iterator[Face]:
 
 
 def load_scene(path: Path, options: SceneOptions | None = None) -> Scene:
-    """The map in a folder, or of a ``map.json``, with its models and textures; raises MapError."""
+    """The map in a folder, or of a ``map.json``, with its models and textures; raises InputError."""
     entries, options = read_map(path), options or SceneOptions()
     triangles = _Budget(entries.path, MAX_TRIANGLES, "triangles of models")
     shapes: dict[tuple[Path, bool], tuple[Shape, int]] = {}

@@ -5,7 +5,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from dodo_dsl.opendlv.assets.json_file import MapError, read_bytes
+from dodo_dsl.opendlv.assets.json_file import read_bytes
+from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.picture_size import problem_of
 from services.scene.raster import Image
 
@@ -55,22 +56,22 @@ def _repeated(tile: Image, limit: int) -> Image:
 
 
 def picture_bytes(path: Path) -> Image:
-    """The bytes of a PNG or JPEG file that is small enough to be decoded; MapError otherwise."""
+    """The bytes of a PNG or JPEG file that is small enough to be decoded; InputError otherwise."""
     data = read_bytes(path)
     if problem := problem_of(data):
-        raise MapError(path, f"{problem}")
+        raise InputError(path, f"{problem}")
     return np.frombuffer(data, np.uint8)
 
 
 def load_picture(path: Path) -> Image:
-    """A picture file as (rows, columns, 3), B, G, R; MapError when OpenCV cannot read it."""
+    """A picture file as (rows, columns, 3), B, G, R; InputError when OpenCV cannot read it."""
     data = picture_bytes(path)
     try:
         picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
     except cv2.error as error:
-        raise MapError(path, f"the picture cannot be read: {error.err}") from error
+        raise InputError(path, f"the picture cannot be read: {error.err}") from error
     if picture is None:
-        raise MapError(path, "not a readable picture, expected PNG or JPEG")
+        raise InputError(path, "not a readable picture, expected PNG or JPEG")
     return np.asarray(picture, np.uint8)
 
 

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from dodo_dsl.opendlv.assets.json_file import MapError
 from dodo_dsl.opendlv.assets.map_file import OverlayEntry
+from dodo_dsl.opendlv.assets.problem import InputError
 from services.scene.camera import CameraMotion, CameraPose, Pinhole
 from services.scene.lens import Alignment, Distortion, lens_of
 from services.scene.raster import Image
@@ -24,14 +24,14 @@ from services.scene.textures import picture_bytes
 
 
 def load_with_alpha(path: Path) -> Image:
-    """A picture file as (rows, columns, 4), B, G, R, A, opaque if it has no alpha; MapError otherwise."""
+    """A picture file as (rows, columns, 4), B, G, R, A, opaque if it has no alpha; InputError otherwise."""
     data = picture_bytes(path)
     try:
         picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
     except cv2.error:
         picture = None
     if picture is None or picture.dtype != np.uint8:
-        raise MapError(path, "not a picture with 8 bits per colour, expected PNG or JPEG")
+        raise InputError(path, "not a picture with 8 bits per colour, expected PNG or JPEG")
     channels = 1 if picture.ndim == 2 else picture.shape[2]
     codes = {1: cv2.COLOR_GRAY2BGRA, 3: cv2.COLOR_BGR2BGRA}
     return np.asarray(cv2.cvtColor(picture, codes[channels]) if channels in codes else picture, np.uint8)
@@ -61,7 +61,7 @@ class Overlay:
 
 
 def load_overlays(entries: tuple[OverlayEntry, ...], width: int, height: int) -> Iterator[Overlay]:
-    """All overlays of a map, for pictures of ``width`` and ``height`` pixels; raises MapError."""
+    """All overlays of a map, for pictures of ``width`` and ``height`` pixels; raises InputError."""
     for entry in entries:
         wide, high = max(1, round(entry.size[0] * width)), max(1, round(entry.size[1] * height))
         picture = cv2.resize(load_with_alpha(entry.file), (wide, high), interpolation=cv2.INTER_AREA)

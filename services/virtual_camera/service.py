@@ -53,7 +53,7 @@ def publisher(memories: Memories) -> Publish:
 
 
 def open_scene(flags: Flags) -> tuple[Renderer, Optics]:
-    """The scene and the camera of the flags; raises MapError and ValueError."""
+    """The scene and the camera of the flags; raises InputError and ValueError."""
     cv2.setNumThreads(1)
     scene = _scene(flags)
     optics = _optics(flags, scene)
@@ -97,7 +97,7 @@ def _memories(context: Context) -> Memories:
 
 
 def build(context: Context) -> Service:
-    """The service from its flags; raises MapError, ValueError and SharedMemoryError."""
+    """The service from its flags; raises InputError, ValueError and SharedMemoryError."""
     flags = context.flags
     renderer, optics = open_scene(flags)
     publish = publisher(_memories(context))

@@ -36,7 +36,7 @@ def main(argv: Sequence[str], stdout: TextIO) -> int:
 
 
 def write_picture(argv: Sequence[str]) -> dict[str, Any]:
-    """Facts about the picture that was written; raises MapError, ValueError and OSError."""
+    """Facts about the picture that was written; raises InputError, ValueError and OSError."""
     outputs = [word.removeprefix(OUTPUT) for word in argv if word.startswith(OUTPUT)]
     if len(outputs) != 1:
         raise ValueError(f"expected {OUTPUT}FILE once: the PNG to write")

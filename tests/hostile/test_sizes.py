@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from dodo_dsl.opendlv.assets import map_file
-from dodo_dsl.opendlv.assets.json_file import MapError
 from dodo_dsl.opendlv.assets.map_file import MAX_OVERLAYS, read_map
 from dodo_dsl.opendlv.assets.mesh_text import MAX_BYTES, MAX_TRIANGLES, MAX_VERTICES
+from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import OdvdError
@@ -103,7 +103,7 @@ def test_what_unfolds_is_refused(
     tmp_path: Path, name: str, content: bytes, read: Callable[[Path], object], said: str
 ) -> None:
     (tmp_path / name).write_bytes(content)
-    with pytest.raises((MapError, TruthError, OdvdError, ValueError), match=said):
+    with pytest.raises((InputError, TruthError, OdvdError, ValueError), match=said):
         read(tmp_path / name)
 
 
@@ -139,7 +139,7 @@ def test_what_is_read_in_all_is_limited(
     monkeypatch.setattr(module, limit, most + 1 if limit == "MAX_LINES" else 1000_000_000)
     read(tmp_path)
     monkeypatch.setattr(module, limit, most)
-    with pytest.raises((MapError, RegistryError), match=said):
+    with pytest.raises((InputError, RegistryError), match=said):
         read(tmp_path)
 
 

@@ -81,7 +81,7 @@ OTHERS = truth_text([Mark("yellow", 0, 4, 6, 3)], "", 7, 7)
 @pytest.mark.parametrize(
     ("content", "words", "sentence"),
     [
-        ("{", (), "truth.json:1:1: '{' is not closed"),
+        ("{", (), "truth.json:1:2: not JSON: expected a key"),
         (OTHERS.replace('"iscrowd": 0', '"iscrowd": 1'), (), "annotations[0]: iscrowd is set"),
         (OTHERS.replace('"image_id": 1', '"image_id": 2'), (), "annotations[0].image_id: no entry has the id 2"),
         (OTHERS.replace('"categories": [', '"categories": [{"id": 2, "name": "x"},'), (), "two have the same id"),

@@ -55,7 +55,7 @@ def test_whatever_a_file_holds_is_refused_in_a_sentence(path: Path, document: ob
 
 def test_a_file_too_deep_or_too_large(tmp_path: Path) -> None:
     path = tmp_path / "truth.json"
-    for size, sentence in ((200_000, "nested too deeply"), (70_000_000, "expected at most 67108864")):
+    for size, sentence in ((200_000, "nested too deeply"), (70_000_000, "larger than 67108864 bytes")):
         with path.open("w") as file:
             file.write("[" * 200_000)
             file.truncate(size)

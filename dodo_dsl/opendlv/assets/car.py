@@ -2,8 +2,7 @@
 
 import difflib
 import math
-import re
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -11,11 +10,8 @@ from typing import Any
 import yaml
 
 from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.numbers import number
-
-
-class CarError(ValueError):
-    """A file that does not describe a car; one sentence with file and line."""
 
 
 @dataclass(frozen=True)
@@ -56,70 +52,50 @@ MOST_BYTES = 1 << 20
 KIWI = Car()
 KEYS = {field.name.replace("_", "-"): field.name for field in fields(Car)}
 
-_POSITIVE = ("mass", "inertia", "front", "rear", "resistance", "steering-limit", "slip-speed")
-_NEGATIVE = ("pedal-reverse",)
-_ANY = ("steering-gain",)
+_ABOVE = dict.fromkeys(
+    ("mass", "inertia", "front", "rear", "resistance", "steering-limit", "slip-speed"), "more than 0"
+)
+_EXPECTED = {**dict.fromkeys(KEYS, "0 or more"), **_ABOVE, "pedal-reverse": "0 or less", "steering-gain": "a number"}
+_IS_WITHIN: dict[str, Callable[[float], bool]] = {
+    "more than 0": lambda value: value > 0,
+    "0 or more": lambda value: value >= 0,
+    "0 or less": lambda value: value <= 0,
+    "a number": lambda value: True,
+}
 
 
 def read_car(path: Path) -> Car:
-    """The car of a YAML or JSON file, the Kiwi's for parameters that it omits; raises CarError."""
-    text = ""
+    """The car of a YAML or JSON file, the Kiwi's for parameters that it omits; raises InputError."""
     try:
-        text = regular_file.text(path, MOST_BYTES)
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        node = yaml.compose(regular_file.text(path, MOST_BYTES), Loader=yaml.SafeLoader)
     except OSError as error:
-        raise CarError(f"{path} cannot be read: {error.strerror}") from None
+        raise InputError(path, f"cannot be read: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
-        _without_space(path, text)
         mark = getattr(error, "problem_mark", None)
-        place = f"{path}:{mark.line + 1}" if mark else str(path)
-        raise CarError(f"{place}: neither YAML nor JSON: {getattr(error, 'problem', None) or error}") from None
+        what = f"neither YAML nor JSON: {getattr(error, 'problem', None) or error}"
+        raise InputError(path, what, line=mark.line + 1 if mark else 0) from None
     if not isinstance(node, yaml.MappingNode):
-        _without_space(path, text)
-        raise CarError(f"{path}: expected the parameters of a car, such as 'mass: 1.113'")
+        hint = "write a space behind each colon"
+        line = node.start_mark.line + 1 if node else 1
+        raise InputError(path, "expected the parameters of a car, such as 'mass: 1.113'", line=line, hint=hint)
     given: dict[str, float] = {}
-    for place, name, value in _entries(path, node):
-        if KEYS[name] in given:
-            raise CarError(f"{place}: {name} appears twice")
-        given[KEYS[name]] = value
+    for key, value in node.value:
+        name = str(key.value)
+        if what := _problem(name, value) or (f"{name} appears twice" if KEYS[name] in given else ""):
+            raise InputError(path, what, line=key.start_mark.line + 1, column=key.start_mark.column + 1)
+        given[KEYS[name]] = number(value.value)
     return replace(KIWI, **given)
 
 
-def _without_space(path: Path, text: str) -> None:
-    """Raises CarError for a line ``mass:1``, with which YAML has no parameters."""
-    for at, line in enumerate(text.splitlines(), 1):
-        match = re.match(r"(?P<name>[a-z-]+):(?P<value>[^\s:]+)", line)
-        if match and match["name"] in KEYS:
-            what = f"a space is missing after the colon, write '{match['name']}: {match['value']}'"
-            raise CarError(f"{path}:{at}:{match.end('name') + 1}: {what}")
-
-
-def _entries(path: Path, node: yaml.MappingNode) -> Iterator[tuple[str, str, float]]:
-    for key, value in node.value:
-        place, name = f"{path}:{key.start_mark.line + 1}", str(key.value)
-        if name not in KEYS:
-            close = difflib.get_close_matches(name, KEYS, 1)
-            raise CarError(f"{place}: unknown parameter '{name}'" + (f", did you mean '{close[0]}'?" if close else ""))
-        yield place, name, _checked(f"{place}: {name}", name, _number(value))
-
-
-def _number(node: Any) -> float:
-    if not isinstance(node, yaml.ScalarNode) or node.style is not None:
-        return math.nan
+def _problem(name: str, node: Any) -> str:
+    if name not in KEYS:
+        close = difflib.get_close_matches(name, KEYS, 1)
+        return f"unknown parameter '{name}'" + (f", did you mean '{close[0]}'?" if close else "")
     try:
-        return number(node.value)
+        value = number(node.value) if isinstance(node, yaml.ScalarNode) and node.style is None else math.nan
     except ValueError:
-        return math.nan
-
-
-def _checked(what: str, name: str, value: float) -> float:
+        value = math.nan
     if not math.isfinite(value):
-        raise CarError(f"{what} is not a finite number")
-    if name in _ANY:
-        return value
-    if name in _NEGATIVE:
-        if value > 0:
-            raise CarError(f"{what} is {value:g}, expected 0 or less")
-    elif value < 0 or (value == 0 and name in _POSITIVE):
-        raise CarError(f"{what} is {value:g}, expected {'more than 0' if name in _POSITIVE else '0 or more'}")
-    return value
+        return f"{name} is not a finite number"
+    expected = _EXPECTED[name]
+    return "" if _IS_WITHIN[expected](value) else f"{name} is {value:g}, expected {expected}"

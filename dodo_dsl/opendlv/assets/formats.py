@@ -1,21 +1,17 @@
 """The formats of files that parameters name: each a function that yields what is wrong with a file.
 
-Of a CSV table it is what all services mind: its columns and rows, and its times. Readers are imported where they are
-needed, as few tests need all of them.
+Readers are imported where they are needed, as few tests need all of them.
 """
 
-import csv
 import os
-import re
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.assets import map_file, mesh_text
-from dodo_dsl.opendlv.assets.json_file import MapError, read_bytes
+from dodo_dsl.opendlv.assets.json_file import read_bytes
 from dodo_dsl.opendlv.assets.problem import InputError
-from dodo_dsl.opendlv.numbers import number
 from dodo_dsl.opendlv.picture_size import problem_of
 
 Settings = Mapping[str, str]
@@ -29,7 +25,6 @@ PICTURES = (".png", ".jpg", ".jpeg")
 _BOXES = "$.annotations"
 _IMAGE, _IMAGE_NAME = 1055, "pictures"
 _POINTER = b"version https://git-lfs"
-_QUOTED = re.compile(r"'([^']+)'")
 
 
 def problems(name: str, path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
@@ -67,7 +62,7 @@ def _map(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
             if not pointer:
                 mesh = mesh_text.read(file)
                 paints += [p for p, _ in mesh_text.paints(file, mesh, read.path.parent)] if is_plain else ()
-        except MapError as error:
+        except InputError as error:
             yield error
     for paint in dict.fromkeys((*paints, *(overlay.file for overlay in read.overlays))):
         if isinstance(paint, Path):
@@ -79,7 +74,7 @@ def _picture(file: Path) -> Iterator[InputError]:
     yield from pointer
     try:
         problem = problem_of(read_bytes(file))
-    except MapError as error:
+    except InputError as error:
         yield error
     else:
         if problem and not pointer:
@@ -92,11 +87,11 @@ def _obstacles(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError
         yield InputError(file, map_file.NO_BODIES, hint='give the model of another vehicle "frames": [1]')
     try:
         found = list(map_file.unread_keys(map_file.load(file)))
-    except MapError as error:
+    except InputError as error:
         found = [error]
     yield from found
     if all(problem.is_slip for problem in found):
-        yield from _raised(path, lambda: map_file.read_obstacles(path))
+        yield from _raised(lambda: map_file.read_obstacles(path))
 
 
 def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
@@ -123,10 +118,9 @@ def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
 def _target(path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
     field = settings["target-field"] or settings["field"]
     if path.suffix != RECORDING:
-        from dodo_dsl.opendlv.assets import target_table
+        from dodo_dsl.opendlv.assets import table
 
-        wrong = _table(path) or list(_raised(path, lambda: target_table.read(path, field)))
-        yield from wrong or target_table.misspelt(path, field)
+        yield from _raised(lambda: table.read_target(path, field)) or table.misspelt(path, field)
         return
     message = settings["target-message"] or settings["message"]
     sender = settings["target-sender"] or settings["sender"]
@@ -134,24 +128,21 @@ def _target(path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
         yield from _contents(path, ids[message], int(sender), message, is_needed=True)
 
 
-def _table(path: Path) -> list[InputError]:
-    """What is wrong with any table: services that read the same one report it alike."""
-    problem = problem_in_table(path)
-    return [] if problem is None else [problem]
-
-
 def _way_points(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
-    from dodo_dsl.opendlv.assets import trajectory
-    from dodo_dsl.opendlv.assets.trajectory import Trajectory
+    from dodo_dsl.opendlv.assets.trajectory import Trajectory, TrajectoryError, read_table
 
-    speed = float(settings["speed"] or 1)
-    yield from _table(path) or _raised(path, lambda: Trajectory(trajectory.read_table(path, 0.0), speed))
+    try:
+        Trajectory(read_table(path, 0.0), float(settings["speed"] or 1))
+    except InputError as error:
+        yield error
+    except TrajectoryError as error:
+        yield InputError(path, error.what, line=error.line)
 
 
 def _car(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
     from dodo_dsl.opendlv.assets import car
 
-    yield from _raised(path, lambda: car.read_car(path))
+    yield from _raised(lambda: car.read_car(path))
 
 
 def _recording(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
@@ -202,93 +193,10 @@ HELP: Mapping[str, str] = {
 """Where to read on, for problems without their own hint."""
 
 
-def _raised(path: Path, read: Callable[[], object]) -> Iterator[InputError]:
-    """What a reader raises, with the position that its sentence begins with."""
+def _raised(read: Callable[[], object]) -> list[InputError]:
+    """What a reader raises."""
     try:
         read()
     except InputError as error:
-        yield error
-    except ValueError as error:
-        found = re.match(re.escape(str(path)) + r"(?::(\d+))?(?::(\d+))?:? (.*)", str(error), re.DOTALL)
-        line, column, what = found.groups() if found else (None, None, str(error))
-        at = int(line or 0)
-        yield InputError(path, what, line=at, column=int(column or 0) or _column(path, at, what))
-
-
-def _column(path: Path, line: int, what: str) -> int:
-    """Where what a sentence quotes is in its line; the start of the line where it quotes nothing."""
-    quoted = _QUOTED.search(what)
-    if not line or quoted is None:
-        return 1
-    try:
-        lines = regular_file.text(path).splitlines()
-    except (OSError, ValueError):
-        return 1
-    return lines[line - 1].find(quoted[1]) + 1 or 1 if line <= len(lines) else 1
-
-
-_TIME = "time"
-_LEAST = 2
-
-Row = tuple[int, str, list[str]]
-"""A line from 1, its text, and its cells."""
-
-
-def problem_in_table(path: Path) -> InputError | None:
-    """The first problem of a CSV table; None if each reader has to say what is wrong, and for what is not text."""
-    try:
-        rows = list(_rows(regular_file.text(path)))
-    except (OSError, ValueError, csv.Error):
-        return None
-    if not rows:
-        return InputError(path, "the table is empty, expected a header and rows", hint="for example 'time,x,y'")
-    line, text, header = rows[0]
-    if len(header) == 1 and ";" in text:
-        what = "semicolons between the columns, expected commas, and decimals with a point"
-        hint = "save the table anew with ',' between the columns and '.' in numbers"
-        return InputError(path, what, line=line, column=text.index(";") + 1, hint=hint)
-    if all(_is_number(cell) for cell in header):
-        return InputError(path, "the table has no header", line=line, column=1, hint="for example 'time,x,y'")
-    if len(rows) <= _LEAST:
-        what = f"expected at least {_LEAST} rows below the header, found {len(rows) - 1}"
-        return InputError(path, what, line=rows[-1][0], column=1, hint="save the whole table")
-    return _width(path, header, rows[1:]) or _times(path, header, rows[1:])
-
-
-def _rows(text: str) -> Iterator[Row]:
-    for line, written in enumerate(text.splitlines(), 1):
-        if written.strip() and not written.lstrip().startswith("#"):
-            yield line, written, [cell.strip() for cell in next(csv.reader([written], strict=True))]
-
-
-def _width(path: Path, header: Sequence[str], rows: Sequence[Row]) -> InputError | None:
-    for line, text, cells in rows:
-        if len(cells) != len(header):
-            what = f"{len(cells)} values, expected {len(header)}: {', '.join(header)}"
-            more = len(cells) > len(header) and ";" not in text
-            hint = "decimals have a point: 0.25, and not 0,25" if more else "write one value for each column"
-            return InputError(path, what, line=line, column=1, hint=hint)
-    return None
-
-
-def _times(path: Path, header: Sequence[str], rows: Sequence[Row]) -> InputError | None:
-    at = header.index(_TIME) if _TIME in header else -1
-    before: float | None = None
-    for line, text, cells in rows if at >= 0 else ():
-        if not _is_number(cells[at]):
-            return None
-        time = number(cells[at])
-        if before is not None and time <= before:
-            what = f"the time '{cells[at]}' is not after {before:g} s, the time of the row before"
-            column = text.find(cells[at]) + 1 if at == 0 else 1
-            return InputError(path, what, line=line, column=column, hint="times increase from row to row")
-        before = time
-    return None
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        number(cell)
-    except ValueError:
-        return False
-    return True
+        return [error]
+    return []

@@ -1,7 +1,4 @@
-"""JSON values that know their file and path, so that every error names its position.
-
-What is wrong with text that is not JSON is in our own words: a table of the mistakes that people make.
-"""
+"""JSON values that know their file and path, so that every error names its position."""
 
 import difflib
 import functools
@@ -12,166 +9,88 @@ import sys
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn, Self
+from typing import Any, NoReturn, Self
 
-from dodo_dsl.opendlv.assets.problem import InputError, place_of_key
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.assets.problem import InputError
 
-_TOKEN = re.compile(r'"(?:[^"\\\n]++|\\.)*+"|[][{}]')
-_CLOSING = {"{": "}", "[": "]"}
-_NEAR = 2000
-"""Characters before and behind the position where Python's reader gives up that are looked at."""
-_SHOWN = 30
-_VALUES = "a value is a text in double quotes, a number, true, false, null, [...] or {...}"
-_SLIPS = (
-    (r"(?P<at>,)\s*\0(?P<sign>[]}])", "a comma before the closing '{sign}'", "remove it: JSON has none there"),
-    (r"\0(?P<at>,)\s*(?P<sign>[]}])", "a comma before the closing '{sign}'", "remove it: JSON has none there"),
-    (r"\0(?://|/\*|#)", "a comment, which JSON does not have", "remove it"),
-    (r"\0['`\u201c\u201e]", "other quotation marks than JSON has", 'write "..."'),
-    (r"\0(?P<at>\\.)", "'{at}' means nothing in JSON", "write \\\\ for a backslash, or / in a path"),
-    (
-        r'\0"(?:[^"\\\n]|\\.)*(?:\n|$)',
-        "this quotation mark is not closed in its line",
-        'write " at the end of the text',
-    ),
-    (r"\0[\x01-\x1f]", "a tab or another control character within a text", "write \\t, or a space"),
-    (
-        r"[{,]\s*\0(?P<at>[A-Za-z_][\w.-]*)",
-        "'{at}' is not a key, which is a text in double quotes",
-        'write "{at}": and its value',
-    ),
-    (r"\0(?P<at>None|True|False)\b", "'{at}' is Python, not JSON", "write null, true or false"),
-    (
-        r'\{(?:[^{}]*,)?\s*"(?:[^"\\\n]|\\.)*(?P<at>")\s*\0[^:]',
-        "':' is missing behind this key",
-        "write ':' and its value",
-    ),
-    (r'(?P<at>[]}"])\s*\0[-"[{0-9tfn]', "a comma is missing behind this value", "write ',' here"),
-    (r'(?P<at>[0-9a-z])\s+\0[-"[{0-9tfn]', "a comma is missing behind this value", "write ',' here"),
-    (
-        r"(?<![\w.])(?P<at>-?[0-9]*\0[-+]?[0-9]*\.?[0-9]*)(?<=[\d.])",
-        "'{at}' is not a number of JSON",
-        "write digits before and behind the point, as in 0.5, and no other zero or plus before them",
-    ),
-    (
-        r"[0-9] *\0(?P<at>[A-Za-z%\u00b0/]+)",
-        "'{at}' behind a value",
-        "remove it: JSON has numbers without units, and other text in quotes",
-    ),
-)
-"""Patterns of the text around that position, which is marked in it, with what to say about their group ``at``."""
-
-
-class JsonError(ValueError):
-    """Text that is not JSON, or has a key twice: what is wrong, with line and column from 1, and what to write."""
-
-    def __init__(self, what: str, hint: str, line: int, column: int) -> None:
-        super().__init__(what)
-        self.what, self.hint, self.line, self.column = what, hint, line, column
-
-
-class _Slip(NamedTuple):
-    """A mistake; ``at`` is its position in the text, from 0."""
-
-    at: int
-    what: str
-    hint: str = ""
-
-
-class _Twice(ValueError):
-    """An object has this key twice."""
-
-
-def loads(text: str) -> Any:
-    """The JSON of a text; raises JsonError, RecursionError, and ValueError for a number of too many digits."""
-    ended = 0
-
-    def once(pairs: list[tuple[str, object]]) -> dict[str, object]:
-        nonlocal ended
-        ended += 1
-        if len(found := dict(pairs)) < len(pairs):
-            names = [name for name, _ in pairs]
-            raise _Twice(next(name for at, name in enumerate(names) if name in names[:at]))
-        return found
-
-    try:
-        return json.loads(text, object_pairs_hook=once)
-    except json.JSONDecodeError as error:
-        slip = _slip(text, error.pos)
-    except _Twice as twice:
-        slip = _second(text, ended, str(twice))
-    line = text.count("\n", 0, slip.at) + 1
-    raise JsonError(slip.what, slip.hint, line, slip.at - text.rfind("\n", 0, slip.at))
-
-
-def _second(text: str, number: int, name: str) -> _Slip:
-    """The key that the object has twice which is the one to end as this ``number``, counted from 1."""
-    begin = _brackets(text)[1][number - 1]
-    what = f"the key {json.dumps(name, ensure_ascii=False)} appears twice in one object"
-    return _Slip(place_of_key(text, begin, name), what, "keep one of them: only the last would count")
-
-
-def _brackets(text: str) -> tuple[list[int], list[int]]:
-    """Where brackets begin that are not closed, and where objects do that are, in the order in which they end."""
-    open_, objects = list[int](), list[int]()
-    for token in _TOKEN.finditer(text):
-        if token[0] in _CLOSING:
-            open_.append(token.start())
-        elif token[0] in "]}" and open_:
-            begin = open_.pop()
-            objects.extend([begin] if text[begin] == "{" else [])
-    return open_, objects
-
-
-def _slip(text: str, at: int) -> _Slip:
-    if not text.strip():
-        return _Slip(0, "the file is empty, expected JSON", "an object begins with { and ends with }")
-    begin = max(0, at - _NEAR)
-    near = f"{text[begin:at]}\0{text[at : at + _NEAR]}"
-    for pattern, what, hint in _SLIPS:
-        if found := re.search(pattern, near):
-            place = found.start("at") if "at" in found.groupdict() else found.start() + found[0].index("\0") + 1
-            words = {name: word.replace("\0", "")[:_SHOWN] for name, word in found.groupdict().items()}
-            return _Slip(begin + place - near.count("\0", 0, place), what.format(**words), hint.format(**words))
-    if slip := _of_brackets(text, at):
-        return slip
-    word = re.match(r"[-+.\w]+|.|$", text[at : at + _SHOWN], re.DOTALL)
-    return _Slip(at, f"not JSON: '{word[0] if word else ''}' is not expected here", _VALUES)
-
-
-def _of_brackets(text: str, at: int) -> _Slip | None:
-    open_, sign = _brackets(text[:at])[0], text[at : at + 1]
-    if open_ and not text[at:].strip():
-        bracket = text[open_[-1]]
-        return _Slip(open_[-1], f"'{bracket}' is not closed", f"write '{_CLOSING[bracket]}' where it ends")
-    if open_ and sign in ("}", "]") and sign != (closing := _CLOSING[text[open_[-1]]]):
-        what = f"'{sign}' does not close '{text[open_[-1]]}' of line {text.count(chr(10), 0, open_[-1]) + 1}"
-        return _Slip(at, what, f"write '{closing}' before it, or remove '{sign}' if it is too many")
-    if not open_ and text[:at].strip():
-        return _Slip(at, f"'{sign}' follows the end of the JSON", "remove it, or the bracket too many before it")
-    return None
-
-
-MAX_BYTES = 64 * 1024 * 1024
 MAX_NUMBER = 100_000.0
+_EXPECTED = {
+    "Expecting ','": "a comma or a closing bracket",
+    "Expecting ':'": "':' behind the key",
+    "Expecting property": "a key in double quotes",
+    "Extra data": "nothing more, as the JSON ends before",
+    "Unterminated": 'a text that ends with " in its line',
+    "Invalid control": "a text without tabs and line breaks",
+    "Invalid \\": "\\\\ for a backslash, or / in a path",
+}
+"""What to say for how Python's sentences begin."""
+_VALUE = "a value: a text in double quotes, a number such as -0.5, true, false, null, [...] or {...}"
+_SHOWN = 30
 
 
-class MapError(InputError):
-    """A map that cannot be used."""
+class _Twice(dict[str, Any]):
+    """An object that has a key twice, and the key."""
+
+    key = ""
 
 
 def read_bytes(path: Path) -> bytes:
-    """The contents of a regular file of at most 64 MiB; MapError otherwise."""
-    if not path.exists():
-        raise MapError(path, "there is no such file", sentence=f"there is no file '{path}'")
-    if not path.is_file():
-        raise MapError(path, "not a regular file")
-    size = path.stat().st_size
-    if size > MAX_BYTES:
-        raise MapError(path, f"the file has {size} bytes, expected at most {MAX_BYTES}")
+    """The contents of a regular file of at most 64 MiB; raises InputError."""
     try:
-        return path.read_bytes()
+        return regular_file.content(path)
     except OSError as error:
-        raise MapError(path, f"the file cannot be read: {error.strerror}") from error
+        raise InputError(path, f"cannot be read: {error.strerror}") from None
+
+
+def loads(file: Path, text: str) -> Any:
+    """The JSON of a file's text; raises InputError."""
+    is_doubtful = False
+
+    def once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+        nonlocal is_doubtful
+        if len(found := dict(pairs)) < len(pairs):
+            is_doubtful, found = True, _Twice(found)
+            names = [name for name, _ in pairs]
+            found.key = next(name for at, name in enumerate(names) if name in names[:at])
+        return found
+
+    try:
+        value = json.loads(text, object_pairs_hook=once)
+        place = next(_repeated(value, "$"), "") if is_doubtful else ""
+    except json.JSONDecodeError as error:
+        raise _refused(file, text, error) from None
+    except RecursionError:
+        raise InputError(file, "the JSON is nested too deeply") from None
+    except ValueError:
+        raise InputError(file, f"a number has more than {sys.get_int_max_str_digits()} digits") from None
+    if place:
+        what = f"the key '{place.rpartition('.')[2]}' appears twice in one object"
+        raise InputError(file, what, place, hint="keep one of them: only the last would count", is_of_key=True)
+    return value
+
+
+def _repeated(value: Any, place: str) -> Iterator[str]:
+    """The paths of keys that stand twice in their objects."""
+    if isinstance(value, _Twice):
+        yield f"{place}.{value.key}"
+    for step, inner in value.items() if isinstance(value, dict) else ():
+        yield from _repeated(inner, f"{place}.{step}")
+    for number, inner in enumerate(value if isinstance(value, list) else ()):
+        yield from _repeated(inner, f"{place}[{number}]")
+
+
+def _refused(file: Path, text: str, error: json.JSONDecodeError) -> InputError:
+    before, at = text[: error.pos].rstrip(), error.pos
+    expected, hint = next((said for begin, said in _EXPECTED.items() if error.msg.startswith(begin)), _VALUE), ""
+    if text[at : at + 1] in "]}" and before.endswith(","):
+        at = len(before) - 1
+    if text[at : at + 1] == "," and text[at + 1 :].lstrip()[:1] in "]}":
+        expected, hint = "a closing bracket", "remove the comma: JSON has none there"
+    word = re.match(r"[-+.\w]+|.", text[at:].lstrip()[:_SHOWN], re.DOTALL)
+    found = f"'{word[0]}'" if word else "the end of the file"
+    line, column = text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)
+    return InputError(file, f"not JSON: expected {expected}, found {found}", line=line, column=column, hint=hint)
 
 
 def _shown(value: object) -> str:
@@ -186,14 +105,13 @@ def near(word: str, known: Iterable[str]) -> str:
 
 
 @functools.lru_cache(maxsize=2)
-def _document(data: bytes) -> object:
+def _document(file: Path, data: bytes) -> object:
     """The JSON in a file, which several readers may look at one after the other; none of them changes it."""
-    return loads(data.decode("utf-8-sig"))
-
-
-def forget() -> None:
-    """Keep no document in memory."""
-    _document.cache_clear()
+    try:
+        return loads(file, data.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise InputError(file, f"byte {error.start} is not UTF-8 text", line=line) from None
 
 
 @dataclass(frozen=True)
@@ -206,25 +124,11 @@ class Node:
 
     @classmethod
     def load(cls, file: Path) -> Self:
-        data = read_bytes(file)
-        try:
-            return cls(file, "$", _document(data))
-        except JsonError as error:
-            raise MapError(file, error.what, line=error.line, column=error.column, hint=error.hint) from error
-        except UnicodeDecodeError as error:
-            raise MapError(
-                file, "not UTF-8 text", line=_line(error), sentence=f"{file}: byte {error.start} is not UTF-8 text"
-            ) from error
-        except RecursionError as error:
-            raise MapError(file, "the JSON is nested too deeply") from error
-        except ValueError as error:
-            most = sys.get_int_max_str_digits()
-            is_long = "integer string conversion" in str(error)
-            what = f"a number has more than {most} digits" if is_long else f"not JSON: {str(error)[:120]}"
-            raise MapError(file, what) from error
+        """The whole document; raises InputError."""
+        return cls(file, "$", _document(file, read_bytes(file)))
 
     def fail(self, expected: str, hint: str = "") -> NoReturn:
-        raise MapError(self.file, f"expected {expected}, found {_shown(self.value)}", self.place, hint=hint)
+        raise InputError(self.file, f"expected {expected}, found {_shown(self.value)}", self.place, hint=hint)
 
     def member(self, key: str) -> "Node | None":
         if not isinstance(self.value, dict):
@@ -236,7 +140,7 @@ class Node:
         return node if node is not None else self.lacks(f"'{key}'")
 
     def lacks(self, what: str) -> NoReturn:
-        raise MapError(self.file, f"{what} is missing", self.place)
+        raise InputError(self.file, f"{what} is missing", self.place)
 
     def items(self, key: str) -> Iterator["Node"]:
         """The elements of the list ``key``; none when there is no such list."""
@@ -268,7 +172,7 @@ class Node:
         return float(value)
 
     def resource(self) -> Path:
-        """The file that this names; MapError when it is not there or outside the map's folder."""
+        """The file that this names; InputError when it is not there or outside the map's folder."""
         name, folder = self.text(), self.file.parent.resolve()
         try:
             path = (folder / name).resolve()
@@ -286,7 +190,7 @@ class Node:
         return path
 
 
-def unread(entries: Iterable[Node], known: Collection[str], needed: Collection[str] = ()) -> Iterator[MapError]:
+def unread(entries: Iterable[Node], known: Collection[str], needed: Collection[str] = ()) -> Iterator[InputError]:
     """Keys of objects of one kind that nothing reads, each once; an error where a ``needed`` one is meant."""
     found: dict[str, list[Node]] = {}
     for entry in entries:
@@ -300,13 +204,8 @@ def unread(entries: Iterable[Node], known: Collection[str], needed: Collection[s
         yield of_keys(those, key, f"nothing reads '{key}'", hint or f"known: {', '.join(known)}", is_slip)
 
 
-def of_keys(entries: Sequence[Node], key: str, what: str, hint: str = "", is_slip: bool = True) -> MapError:
+def of_keys(entries: Sequence[Node], key: str, what: str, hint: str = "", is_slip: bool = True) -> InputError:
     """The problem of a key that these objects have, at the first."""
     more = f" (and in {len(entries) - 1} more)" if len(entries) > 1 else ""
     place = f"{entries[0].place}.{key}"
-    return MapError(entries[0].file, what + more, place, hint=hint, is_slip=is_slip, is_of_key=True)
-
-
-def _line(error: UnicodeDecodeError) -> int:
-    """The line of the first byte that is not UTF-8."""
-    return error.object.count(b"\n", 0, error.start) + 1
+    return InputError(entries[0].file, what + more, place, hint=hint, is_slip=is_slip, is_of_key=True)

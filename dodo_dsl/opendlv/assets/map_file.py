@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from dodo_dsl.opendlv.assets import mesh_text
-from dodo_dsl.opendlv.assets.json_file import MAX_NUMBER, MapError, Node, of_keys, read_bytes, unread
+from dodo_dsl.opendlv.assets.json_file import MAX_NUMBER, Node, of_keys, read_bytes, unread
+from dodo_dsl.opendlv.assets.problem import InputError
 
 MAX_INSTANCES = 100_000
 MAX_BLOCKS = 500
@@ -51,7 +52,7 @@ class ModelEntry:
     frames: tuple[int, ...] = ()
 
     def footprint(self) -> list[tuple[float, float]]:
-        """The model's convex outline from above, at a frame at the origin that looks along x; raises MapError."""
+        """The model's convex outline from above, at a frame at the origin that looks along x; raises InputError."""
         cos, sin = math.cos(FRAME_TURN), math.sin(FRAME_TURN)
         return [(cos * x - sin * y, sin * x + cos * y) for x, y in mesh_text.outline(self.file)]
 
@@ -115,14 +116,14 @@ def _frames(node: Node) -> tuple[int, ...]:
     found: list[int] = []
     items = list(node.items("frames"))
     if len(items) > MAX_FRAMES:
-        raise MapError(
+        raise InputError(
             node.file, f"{len(items)} frames of a model, expected at most {MAX_FRAMES}", f"{node.place}.frames"
         )
     for item in items:
         if isinstance(item.value, bool) or not isinstance(item.value, int) or not 0 <= item.value <= MAX_STAMP:
             item.fail(f"a sender stamp, a whole number from 0 to {MAX_STAMP}")
         if item.value in found:
-            raise MapError(item.file, f"the sender stamp {item.value} appears twice", item.place, hint="remove one")
+            raise InputError(item.file, f"the sender stamp {item.value} appears twice", item.place, hint="remove one")
         found.append(item.value)
     return tuple(found)
 
@@ -186,13 +187,13 @@ _WALL = "a wall x1,y1,x2,y2; in m"
 
 
 def load(file: Path) -> Node:
-    """The document of a map; walls ``x1,y1,x2,y2;`` of a text file are its obstacles. Raises MapError."""
+    """The document of a map; walls ``x1,y1,x2,y2;`` of a text file are its obstacles. Raises InputError."""
     if file.suffix != WALLS:
         return Node.load(file)
     lines = enumerate(read_bytes(file).decode(errors="replace").splitlines(), 1)
     walls = [_wall(file, wall, number) for number, line in lines for wall in line.split(";") if wall.strip()]
     if not walls:
-        raise MapError(file, f"the file is empty, expected {_WALL}", line=1)
+        raise InputError(file, f"the file is empty, expected {_WALL}", line=1)
     return Node(file, "$", {"obstacles": [{"lines": [wall]} for wall in walls]})
 
 
@@ -202,12 +203,12 @@ def _wall(file: Path, text: str, line: int) -> list[float]:
     except ValueError:
         wall = []
     if len(wall) != 4 or not all(abs(value) <= MAX_NUMBER for value in wall):
-        raise MapError(file, f"expected {_WALL}, found '{text.strip()[:60]}'", line=line, hint="as -2,0,2,0;")
+        raise InputError(file, f"expected {_WALL}, found '{text.strip()[:60]}'", line=line, hint="as -2,0,2,0;")
     return wall
 
 
 def read_map(path: Path) -> MapFile:
-    """Reads and checks the map in a folder (or a ``map.json``); MapError names the file and the JSON path."""
+    """Reads and checks the map in a folder (or a ``map.json``); InputError names the file and the JSON path."""
     file = find_map(path)
     return _collected(file, load(file), _raised)
 
@@ -229,18 +230,18 @@ def read_frames(path: Path) -> tuple[int, ...]:
         if b'"frames"' in read_bytes(file):
             for model in Node.load(file).items("model"):
                 found.update(_frames(model))
-    except MapError:
+    except InputError:
         return ()
     return tuple(sorted(found)) if len(found) <= MAX_FRAMES else ()
 
 
-def problems(path: Path) -> tuple[MapFile | None, list[MapError]]:
+def problems(path: Path) -> tuple[MapFile | None, list[InputError]]:
     """What can be drawn of a map, None for what is not a map, and all that is wrong with it."""
-    file, found = find_map(path), list[MapError]()
+    file, found = find_map(path), list[InputError]()
     try:
         root = load(file)
         read = _collected(file, root, found.append)
-    except MapError as error:
+    except InputError as error:
         return None, [error]
     found.extend(unread_keys(root))
     found.extend(_without_effect(root))
@@ -248,14 +249,14 @@ def problems(path: Path) -> tuple[MapFile | None, list[MapError]]:
     return read, found
 
 
-def unread_keys(root: Node) -> Iterator[MapError]:
+def unread_keys(root: Node) -> Iterator[InputError]:
     """Keys of a map that nothing reads; errors where those of an obstacle are meant."""
     yield from unread([root], _KEYS, ("obstacles",))
     for key, known in _KEYS.items():
         yield from unread(_listed(root, key), known, known if key == "obstacles" else ())
 
 
-def _without_effect(root: Node) -> Iterator[MapError]:
+def _without_effect(root: Node) -> Iterator[InputError]:
     """Keys of the format that change nothing in an image, each once."""
     models, blocks = list(_listed(root, "model")), list(_listed(root, "block"))
     yield from _stamps_twice(models)
@@ -266,7 +267,7 @@ def _without_effect(root: Node) -> Iterator[MapError]:
         yield of_keys(sizes, "textureSize", "'textureSize' is not used without 'textureFile'", "remove it")
 
 
-def _stamps_twice(models: Sequence[Node]) -> Iterator[MapError]:
+def _stamps_twice(models: Sequence[Node]) -> Iterator[InputError]:
     """Models at the frame of a later model: OpenDLV draws the last one."""
     later: dict[object, Node] = {}
     for model in reversed(models):
@@ -274,7 +275,7 @@ def _stamps_twice(models: Sequence[Node]) -> Iterator[MapError]:
         for stamp in stamps if isinstance(stamps, list) else ():
             if isinstance(stamp, int) and (other := later.setdefault(stamp, model)) is not model:
                 what = f"{other.place} has the frame {stamp}, too: only the last of them is drawn"
-                yield MapError(model.file, what, f"{model.place}.frames", hint="remove one", is_slip=True)
+                yield InputError(model.file, what, f"{model.place}.frames", hint="remove one", is_slip=True)
 
 
 def _listed(root: Node, key: str) -> Iterator[Node]:
@@ -287,7 +288,7 @@ def _has(entry: Node, key: str) -> bool:
     return isinstance(entry.value, dict) and key in entry.value
 
 
-def _degrees(read: MapFile, root: Node) -> Iterator[MapError]:
+def _degrees(read: MapFile, root: Node) -> Iterator[InputError]:
     """The first angle of more than a turn, which is hardly in radians."""
     for key in ("model", "block"):
         for item in _listed(root, key):
@@ -298,7 +299,7 @@ def _degrees(read: MapFile, root: Node) -> Iterator[MapError]:
                     place = f"{item.place}.instances[{index}][3]"
                     what = f"the angle {angle:g} is more than a turn, expected radians"
                     hint = f"{angle:g} degrees are {math.radians(angle):.5g} rad"
-                    yield MapError(read.path, what, place, hint=hint, is_slip=True)
+                    yield InputError(read.path, what, place, hint=hint, is_slip=True)
                     return
 
 
@@ -310,10 +311,10 @@ _KEYS = {
 }
 """What OpenDLV's maps have in each list."""
 Entry = TypeVar("Entry")
-Report = Callable[[MapError], None]
+Report = Callable[[InputError], None]
 
 
-def _raised(error: MapError) -> None:
+def _raised(error: InputError) -> None:
     raise error
 
 
@@ -329,7 +330,7 @@ def _collected(file: Path, root: Node, report: Report) -> MapFile:
         ("overlay", "instances", sum(len(o.places) for o in overlays), MAX_OVERLAYS),
     ):
         if count > limit:
-            report(MapError(file, f"{count} {what} of {key}s, expected at most {limit}", f"$.{key}"))
+            report(InputError(file, f"{count} {what} of {key}s, expected at most {limit}", f"$.{key}"))
     return MapFile(file, models, blocks, overlays)
 
 
@@ -349,11 +350,11 @@ def _entries(root: Node, key: str, read: Callable[[Node], Entry | None], report:
         for item in root.items(key):
             try:
                 entry = read(item)
-            except MapError as error:
+            except InputError as error:
                 report(error)
             else:
                 found.extend([] if entry is None else [entry])
-    except MapError as error:
+    except InputError as error:
         report(error)
     return tuple(found)
 
@@ -366,7 +367,7 @@ MAX_LINES = 10_000
 def read_obstacles(path: Path) -> dict[str, list[Line]]:
     """The lines of each obstacle of the map in a folder (its `map.json`) or of the map file itself, in metres.
 
-    Obstacles of one name are one; one without a name is named by its number. Raises MapError.
+    Obstacles of one name are one; one without a name is named by its number. Raises InputError.
     """
     root = load(path if path.suffix in (".json", WALLS) else path / "map.json")
     require_few_lines(root)
@@ -388,7 +389,7 @@ Outline = tuple[tuple[float, float], ...]
 
 
 def read_footprints(path: Path, height: float = HIGHEST) -> dict[str, list[Outline]]:
-    """As ``footprints``, of the map in a folder or of a ``map.json``; raises MapError."""
+    """As ``footprints``, of the map in a folder or of a ``map.json``; raises InputError."""
     return footprints(_entries(load(find_map(path)), "block", _block, _raised), height)
 
 
@@ -414,11 +415,11 @@ def _outline(block: BlockEntry, instance: Instance) -> Outline:
 
 
 def require_few_lines(root: Node) -> None:
-    """Raises MapError for more lines than a map may have."""
+    """Raises InputError for more lines than a map may have."""
     lines = [o.value.get("lines") for o in root.items("obstacles") if isinstance(o.value, dict)]
     if (count := sum(len(each) for each in lines if isinstance(each, list))) > MAX_LINES:
         what = f"{count} lines of obstacles, expected at most {MAX_LINES}"
-        raise MapError(root.file, what, "$.obstacles", hint="write long lines in the place of many short ones")
+        raise InputError(root.file, what, "$.obstacles", hint="write long lines in the place of many short ones")
 
 
 def _named_lines(entry: Node, default: str) -> tuple[str, list[Line]]:

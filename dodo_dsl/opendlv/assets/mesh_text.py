@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from dodo_dsl.opendlv.assets.json_file import MapError, read_bytes
+from dodo_dsl.opendlv.assets.json_file import read_bytes
+from dodo_dsl.opendlv.assets.problem import InputError
 
 MAX_BYTES = 16 << 20
 MAX_TRIANGLES = 50_000
@@ -64,12 +65,12 @@ class Mesh:
 
 
 def read(path: Path) -> Mesh:
-    """An OBJ file; raises MapError for one that is not a mesh, or has more than a mesh may have."""
+    """An OBJ file; raises InputError for one that is not a mesh, or has more than a mesh may have."""
     try:
         return _mesh(read_bytes(path))
     except _Wrong as wrong:
         line, what, hint = wrong.args
-        raise MapError(path, what, line=line, hint=hint) from None
+        raise InputError(path, what, line=line, hint=hint) from None
 
 
 @functools.lru_cache(maxsize=4)
@@ -94,7 +95,7 @@ def _mesh(data: bytes) -> Mesh:
 
 
 def outline(path: Path) -> list[tuple[float, float]]:
-    """The convex outline of an OBJ file's faces from above, counter-clockwise in m; raises MapError."""
+    """The convex outline of an OBJ file's faces from above, counter-clockwise in m; raises InputError."""
     mesh = read(path)
     used = {corner for face in mesh.faces for corner in face.corners}
     points = sorted({(x, y) for x, y, *_ in (mesh.vertices[corner] for corner in used)})
@@ -213,7 +214,7 @@ Spots = list[tuple[float, float]]
 
 
 def paints(path: Path, mesh: Mesh, folder: Path) -> list[tuple[Paint, Spots]]:
-    """What each face is painted with by its material, of files in the map's ``folder``, and where; raises MapError."""
+    """What each face is painted with by its material, of files in ``folder``, and where; raises InputError."""
     known: dict[bytes, Paint | None] = {}
     for line, names in mesh.libraries:
         for name in [names] if (path.parent / _name(names)).is_file() else names.split():
@@ -222,7 +223,7 @@ def paints(path: Path, mesh: Mesh, folder: Path) -> list[tuple[Paint, Spots]]:
     for face in mesh.faces:
         if known.get(face.material) is None:
             what = f"material '{_text([face.material])}' has no colour" if face.material else "the face has no material"
-            raise MapError(path, f"{what}, and the map gives the model none", line=face.line, hint=hint)
+            raise InputError(path, f"{what}, and the map gives the model none", line=face.line, hint=hint)
     painted = ((face, known[face.material]) for face in mesh.faces)
     return [(p, _spots(path, mesh, face) if isinstance(p, Path) else []) for face, p in painted if p is not None]
 
@@ -236,7 +237,7 @@ def _spots(path: Path, mesh: Mesh, face: Face) -> Spots:
         found = [(math.nan, math.nan)]
     if not all(map(math.isfinite, itertools.chain(*found))):
         what = "a corner's texture coordinate is not in the file, expected a line 'vt' with two numbers"
-        raise MapError(path, what, line=face.line, hint="save the whole mesh again")
+        raise InputError(path, what, line=face.line, hint="save the whole mesh again")
     return found
 
 
@@ -249,14 +250,14 @@ def _inside(folder: Path, file: Path, line: int, name: bytes) -> Path:
     found = Path(os.path.realpath(file.parent / _name(name)))  # which takes links that never end, too
     if not found.is_relative_to(folder.resolve()):
         hint = "copy it there: the map's folder goes with the test"
-        raise MapError(file, f"'{_name(name)}' is not a file inside the map's folder", line=line, hint=hint)
+        raise InputError(file, f"'{_name(name)}' is not a file inside the map's folder", line=line, hint=hint)
     if not found.is_file():
-        raise MapError(file, f"'{_name(name)}' does not exist", line=line, hint="put it into the map's folder")
+        raise InputError(file, f"'{_name(name)}' does not exist", line=line, hint="put it into the map's folder")
     return found
 
 
 def _materials(file: Path, folder: Path) -> Iterator[tuple[bytes, Paint | None]]:
-    """The materials of an MTL file: a texture (map_Kd), the colour without one (Kd), or None; raises MapError."""
+    """The materials of an MTL file: a texture (map_Kd), the colour without one (Kd), or None; raises InputError."""
     name, is_texture = b"", False
     for line, words in _lines(read_bytes(file)):
         key = words[0].lower()
@@ -274,5 +275,5 @@ def _materials(file: Path, folder: Path) -> Iterator[tuple[bytes, Paint | None]]
                 )
             except ValueError:
                 what = f"'{_text(words)}' is not a colour, expected Kd and three numbers from 0 to 1"
-                raise MapError(file, what, line=line, hint="for example 'Kd 1 0.85 0'") from None
+                raise InputError(file, what, line=line, hint="for example 'Kd 1 0.85 0'") from None
             yield name, (red, green, blue)

@@ -15,7 +15,7 @@ class InputError(ValueError):
 
     ``where`` is a path in a JSON document, such as ``$.model[0].color``; in other text there is a line, and perhaps a
     column, from 1. With ``is_slip`` the file can be used, but hardly means what is written. With ``is_of_key`` the key
-    at ``where`` is wrong. ``what`` is said after the file and a colon, or as its own sentence.
+    at ``where`` is wrong.
     """
 
     def __init__(
@@ -27,14 +27,13 @@ class InputError(ValueError):
         column: int = 0,
         hint: str = "",
         is_slip: bool = False,
-        sentence: str = "",
         is_of_key: bool = False,
     ) -> None:
         self.file, self.where, self.hint, self.is_slip = file, where, hint, is_slip
         self.what = f"{where}: {what}" if where else what
         self._line, self._column, self._is_of_key = line, column, is_of_key
         numbers = "".join(f":{number}" for number in (line, column) if number)
-        super().__init__(sentence or f"{file}{numbers}: {self.what}")
+        super().__init__(f"{file}{numbers}: {self.what}")
 
     def position(self) -> tuple[int, int]:
         """Line and column in the file, from 1; the file is read again for a position in JSON."""
@@ -63,11 +62,6 @@ def json_position(text: str, where: str, is_of_key: bool = False) -> tuple[int, 
         key, at = begin, inner
     at = key if is_of_key else at
     return text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)
-
-
-def place_of_key(text: str, begin: int, key: str) -> int:
-    """Where the last key of this name is in the object that begins at a place of a JSON document."""
-    return _member(text, begin, key, JSONDecoder())[0]
 
 
 def _skip(text: str, at: int) -> int:

@@ -270,7 +270,7 @@ def place(pose: VehiclePose) -> str:
 def load_obstacles(path: Path) -> dict[str, shapely.MultiLineString]:
     """The obstacles of the map in a folder (its `map.json`) or of the map file itself, by name, in metres.
 
-    Obstacles of one name are one. Raises MapError.
+    Obstacles of one name are one. Raises InputError.
     """
     return {name: shapely.MultiLineString(lines) for name, lines in map_file.read_obstacles(path).items()}
 
@@ -327,7 +327,7 @@ def _unknown(name: str, known: list[str], path: Path) -> str:
 
 
 def track(flags: Mapping[str, Any]) -> Track:
-    """The obstacles that the flags name, from the map; raises MapError, and ValueError for flags that make no track."""
+    """The obstacles that the flags name, of the map; raises InputError, and ValueError if they make no track."""
     path, goal, walls, gates = Path(flags["map-path"]), flags["goal"], flags["walls"], flags["gates"]
     least = flags["min-distance"]
     if not (goal or walls or gates or least):

@@ -5,25 +5,30 @@ evenly, the heading by the shorter way round (at exactly half a turn: to the lef
 """
 
 import bisect
-import csv
-import difflib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
-from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.assets.table import Table
 from dodo_dsl.opendlv.numbers import number
 
 
 class TrajectoryError(ValueError):
-    """Way points that make no trajectory; one sentence with their position."""
+    """Way points that make no trajectory; one sentence, and the ``point`` where it is one's fault."""
+
+    def __init__(self, what: str, point: "PathPoint | None" = None) -> None:
+        super().__init__(f"{point.place}: {what}" if point else what)
+        self.what, self.line = what, point.line if point else 0
 
 
 @dataclass(frozen=True)
 class PathPoint:
-    """A way point as written: ``place`` is where, x, y, z in m, ``yaw`` in rad and ``time`` in s where known."""
+    """A way point as written: ``place`` is where, x, y, z in m, ``yaw`` in rad and ``time`` in s where known.
+
+    ``line`` is that of a table, from 1.
+    """
 
     place: str
     x: float
@@ -31,6 +36,7 @@ class PathPoint:
     z: float = 0.0
     yaw: float | None = None
     time: float | None = None
+    line: int = 0
 
 
 @dataclass(frozen=True)
@@ -70,8 +76,7 @@ class Trajectory:
     def __init__(self, points: Sequence[PathPoint], speed: float, endless: bool = False) -> None:
         """``speed`` (m/s) makes the times where the points have none; raises TrajectoryError."""
         if len(points) < 2:
-            place = f"{points[0].place}: " if points else ""
-            raise TrajectoryError(f"{place}expected two way points or more")
+            raise TrajectoryError("expected two way points or more", points[0] if points else None)
         yaws = [p.yaw for p in points]
         turned = [y for y in yaws if y is not None] if None not in yaws else headings(points)
         timed = _timed(points) if points[0].time is not None else _at_speed(points, speed)
@@ -105,7 +110,7 @@ def headings(points: Sequence[PathPoint]) -> list[float]:
     parts = [math.atan2(b.y - a.y, b.x - a.x) if (a.x, a.y) != (b.x, b.y) else None for a, b in pairwise(points)]
     known = next((part for part in parts if part is not None), None)
     if known is None:
-        raise TrajectoryError(f"{points[-1].place}: all way points are at one position: give a yaw")
+        raise TrajectoryError("all way points are at one position: give a yaw", points[-1])
     directions = []
     for part in parts:  # standing still it looks as before
         known = known if part is None else part
@@ -117,10 +122,7 @@ def headings(points: Sequence[PathPoint]) -> list[float]:
 def _timed(points: Sequence[PathPoint]) -> list[float]:
     times = [p.time for p in points if p.time is not None]
     if times[0] < 0:
-        raise TrajectoryError(f"{points[0].place}: time: {times[0]:g} is before the start")
-    for before, now, point in zip(times, times[1:], points[1:], strict=False):
-        if now <= before:
-            raise TrajectoryError(f"{point.place}: time: {now:g} is not after {before:g}, the time of the point before")
+        raise TrajectoryError(f"time: {times[0]:g} is before the start", points[0])
     return times
 
 
@@ -129,7 +131,7 @@ def _at_speed(points: Sequence[PathPoint], speed: float) -> list[float]:
     for a, b in pairwise(points):
         length = math.dist((a.x, a.y, a.z), (b.x, b.y, b.z))
         if length == 0:
-            raise TrajectoryError(f"{b.place}: the same position as the point before: give times instead of a speed")
+            raise TrajectoryError("the same position as the point before: give times instead of a speed", b)
         times.append(times[-1] + length / speed)
     return times
 
@@ -160,21 +162,19 @@ NEEDED, POSSIBLE = ("x", "y"), ("x", "y", "z", "yaw", "time")
 def read_table(path: Path, height: float) -> list[PathPoint]:
     """The way points of a CSV file with a header; ``height`` (m) counts if there is no column z.
 
-    Columns x, y and z in m, yaw in rad, time in s; other columns are ignored, as are blank lines and those that begin
-    with #. Raises TrajectoryError with file and line.
+    Columns x, y and z in m, yaw in rad, time in s; other columns are ignored. Raises InputError.
     """
-    try:
-        text = regular_file.text(path)
-    except OSError as error:
-        raise TrajectoryError(f"{path} cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise TrajectoryError(f"{path} is not UTF-8 text, expected a table with the columns x and y") from None
-    lines = [(f"{path}:{number}", line) for number, line in enumerate(text.splitlines(), 1)]
-    rows = [(place, _cells(place, line)) for place, line in lines if line.strip() and not line.lstrip().startswith("#")]
-    if not rows:
-        raise TrajectoryError(f"{path} is empty, expected a header with the columns x and y, and way points")
-    columns = _columns(*rows[0])
-    return [_point(place, columns, cells, height) for place, cells in rows[1:]]
+    table = Table(path)
+    for error in table.misspelt(POSSIBLE):
+        raise error
+    if any(name not in table.names for name in NEEDED):
+        table.lacks("the columns x and y")
+    columns = {name: [float(each) for each in table.numbers(name)] for name in POSSIBLE if name in table.names}
+    values = [dict(zip(columns, each, strict=True)) for each in zip(*columns.values(), strict=True)]
+    return [
+        PathPoint(f"{path}:{row.line}", **{"z": height, **each}, line=row.line)
+        for row, each in zip(table.rows, values, strict=True)
+    ]
 
 
 def read_points(texts: Iterable[str], height: float) -> list[PathPoint]:
@@ -182,52 +182,11 @@ def read_points(texts: Iterable[str], height: float) -> list[PathPoint]:
     return [_written(text, height) for text in texts]
 
 
-def _cells(place: str, line: str) -> list[str]:
-    try:
-        return [cell.strip() for cell in next(csv.reader([line], strict=True))]
-    except csv.Error as error:
-        raise TrajectoryError(f"{place}: {error}") from None
-
-
-def _columns(place: str, cells: Sequence[str]) -> list[str]:
-    for name in cells:
-        close = difflib.get_close_matches(name.lower(), POSSIBLE, 1, cutoff=0.75)
-        if close and name not in POSSIBLE:
-            raise TrajectoryError(f"{place}: unknown column '{name}', did you mean '{close[0]}'?")
-        if name in POSSIBLE and cells.count(name) > 1:
-            raise TrajectoryError(f"{place}: the column '{name}' appears twice")
-    missing = [name for name in NEEDED if name not in cells]
-    if missing:
-        raise TrajectoryError(f"{place}: the column '{missing[0]}' is missing")
-    return list(cells)
-
-
-def _point(place: str, columns: Sequence[str], cells: Sequence[str], height: float) -> PathPoint:
-    if len(cells) != len(columns):
-        raise TrajectoryError(f"{place}: {len(cells)} values, expected {len(columns)}: {', '.join(columns)}")
-    values = {
-        name: _number(f"{place}: {name}", text) for name, text in zip(columns, cells, strict=True) if name in POSSIBLE
-    }
-    return _from(place, values, height)
-
-
 def _written(text: str, height: float) -> PathPoint:
-    words = text.split()
-    if len(words) != len(NEEDED):
-        raise TrajectoryError(f"the point '{text}' has {len(words)} numbers, expected x and y in m, such as '2 0.5'")
-    place = f"the point '{text}'"
-    return _from(place, {name: _number(place, word) for name, word in zip(NEEDED, words, strict=True)}, height)
-
-
-def _from(place: str, values: Mapping[str, float], height: float) -> PathPoint:
-    return PathPoint(place, values["x"], values["y"], values.get("z", height), values.get("yaw"), values.get("time"))
-
-
-def _number(what: str, text: str) -> float:
     try:
-        value = number(text)
+        x, y = map(number, text.split())
     except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise TrajectoryError(f"{what}: '{text}' is not a finite number")
-    return value
+        x = y = math.nan
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise TrajectoryError(f"the point '{text}': expected two finite numbers x and y in m, such as '2 0.5'")
+    return PathPoint(f"the point '{text}'", x, y, height)

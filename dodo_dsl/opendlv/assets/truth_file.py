@@ -120,7 +120,7 @@ def _keys(images: Mapping[int, Node], frames: Frames, path: Path) -> dict[int, i
         return keys
     if len(images) > 1:
         what = f"has {len(images)} images, expected one for all frames; see truth-frames"
-        raise InputError(path, what, line=1, sentence=f"{path}: {what}")
+        raise InputError(path, what, line=1)
     return dict.fromkeys(images, 0)
 
 

@@ -9,7 +9,7 @@ from dodo_dsl import atomic, package_data
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.assets import map_file
-from dodo_dsl.opendlv.assets.json_file import MapError
+from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import OdvdError
 from dodo_dsl.outcome import (
@@ -205,7 +205,7 @@ def _bodies(ground: Ground, own: int) -> Iterator[dict[str, Any]]:
     for stamp, (name, model) in map_file.bodies(ground.moving, own).items():
         try:
             outline = model.footprint()
-        except MapError:
+        except InputError:
             continue  # reported by the service that draws it
         yield {"name": shown(name, 80), "sender": stamp, "colour": list(colour_of(model)), "outline": outline[:_MOST]}
 

@@ -85,5 +85,5 @@ def test_on_the_bus(cid: int, tmp_path: Path) -> None:
 
 def test_a_bad_table_is_refused_with_its_place(tmp_path: Path) -> None:
     (tmp_path / "path.csv").write_text("x,y\n0,0\n1,here\n")
-    words = f"{tmp_path}/path.csv:3: y: 'here' is not a finite number"
+    words = f"{tmp_path}/path.csv:3:3: y: 'here' is not a finite number"
     assert refusal("beacon", f"--path={tmp_path}/path.csv") == words

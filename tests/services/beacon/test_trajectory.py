@@ -105,7 +105,6 @@ def test_wrapped_is_the_same_angle(angle: float) -> None:
     [
         ([(0, 0)], "t.csv:2: expected two way points or more"),
         ([(0, 0), (1, 0), (1, 0)], "t.csv:4: the same position as the point before"),
-        ([(0, 0, 0.0, 0.0), (1, 0, 0.0, 2.0), (1, 0, 0.0, 2.0)], "t.csv:4: time: 2 is not after 2"),
         ([(0, 0, 0.0, -1.0), (1, 0, 0.0, 2.0)], "t.csv:2: time: -1 is before the start"),
         ([(1, 1, None, 0.0), (1, 1, None, 2.0)], "t.csv:3: all way points are at one position"),
     ],

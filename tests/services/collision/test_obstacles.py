@@ -74,7 +74,7 @@ def test_a_map_may_have_none(tmp_path: Path) -> None:
         ({"obstacles": [{"lines": [[0, 0, 1, 1], [0, 0, 1]]}]}, ": $.obstacles[0].lines[1]: expected the numbers"),
         ({"obstacles": [{"lines": [0, 0, "1", 1]}]}, ": $.obstacles[0].lines[2]: expected a number"),
         ('{"obstacles": [{"lines": [[0, 0, NaN, 1]]}]}', ": $.obstacles[0].lines[0][2]: expected a number"),
-        ("[", ":1:1: '[' is not closed"),
+        ("[", ":1:2: not JSON: expected a value"),
     ],
 )
 def test_what_is_no_map_is_said_with_its_place(tmp_path: Path, document: Any, message: str) -> None:
@@ -86,7 +86,7 @@ def test_what_is_no_map_is_said_with_its_place(tmp_path: Path, document: Any, me
 def test_a_missing_map(tmp_path: Path) -> None:
     with pytest.raises(ValueError) as caught:
         load_obstacles(tmp_path / "nowhere")
-    assert str(caught.value) == f"there is no file '{tmp_path / 'nowhere' / 'map.json'}'"
+    assert str(caught.value) == f"{tmp_path / 'nowhere' / 'map.json'}: cannot be read: No such file or directory"
 
 
 def test_unknown_names_are_said_with_what_there_is(tmp_path: Path) -> None:

@@ -193,5 +193,5 @@ def test_a_silent_application_fails_when_the_time_is_over(table: Path) -> None:
 def test_a_target_that_cannot_be_used_is_refused(tmp_path: Path) -> None:
     (tmp_path / "bad.csv").write_text("time,value\n0,1\n0,2\n")
     assert refusal("continuous_signal", *FLAGS, f"--target={tmp_path}/bad.csv") == (
-        f"{tmp_path}/bad.csv:3: the time 0 s appears twice, expected times that increase by at least a microsecond"
+        f"{tmp_path}/bad.csv:3:1: the time '0' is not after 0 s, that of the row before"
     )

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.assets.car import KEYS, KIWI, CarError, read_car
+from dodo_dsl.opendlv.assets.car import KEYS, KIWI, read_car
+from dodo_dsl.opendlv.assets.problem import InputError
 
 
 def written(folder: Path, text: str, name: str = "car.yml") -> Path:
@@ -29,29 +30,29 @@ def test_what_is_left_out_is_the_kiwi_car(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", ": expected the parameters of a car"),
-        ("- mass\n", ": expected the parameters of a car"),
-        ("mass: 1\n\nmas: 2\n", ":3: unknown parameter 'mas', did you mean 'mass'?"),
-        ("mass: heavy\n", ":1: mass is not a finite number"),
-        ("mass: '1'\n", ":1: mass is not a finite number"),
-        ("mass: [1]\n", ":1: mass is not a finite number"),
-        ("mass: nan\n", ":1: mass is not a finite number"),
-        ("front: 1\nmass: 0\n", ":2: mass is 0, expected more than 0"),
-        ("gain-forward: -1\n", ":1: gain-forward is -1, expected 0 or more"),
-        ("pedal-reverse: 0.5\n", ":1: pedal-reverse is 0.5, expected 0 or less"),
-        ("mass: 1\nmass: 2\n", ":2: mass appears twice"),
+        ("", ":1: expected the parameters of a car"),
+        ("- mass\n", ":1: expected the parameters of a car"),
+        ("mass: 1\n\nmas: 2\n", ":3:1: unknown parameter 'mas', did you mean 'mass'?"),
+        ("mass: heavy\n", ":1:1: mass is not a finite number"),
+        ("mass: '1'\n", ":1:1: mass is not a finite number"),
+        ("mass: [1]\n", ":1:1: mass is not a finite number"),
+        ("mass: nan\n", ":1:1: mass is not a finite number"),
+        ("front: 1\nmass: 0\n", ":2:1: mass is 0, expected more than 0"),
+        ("gain-forward: -1\n", ":1:1: gain-forward is -1, expected 0 or more"),
+        ("pedal-reverse: 0.5\n", ":1:1: pedal-reverse is 0.5, expected 0 or less"),
+        ("mass: 1\nmass: 2\n", ":2:1: mass appears twice"),
         ("mass: [1\n", ":2: neither YAML nor JSON: "),
     ],
 )
 def test_mistakes_are_named_with_file_and_line(tmp_path: Path, text: str, sentence: str) -> None:
     path = written(tmp_path, text)
-    with pytest.raises(CarError) as caught:
+    with pytest.raises(InputError) as caught:
         read_car(path)
     assert str(caught.value).startswith(f"{path}{sentence}")
 
 
 def test_a_missing_file(tmp_path: Path) -> None:
-    with pytest.raises(CarError, match=r"none\.yml cannot be read: No such file"):
+    with pytest.raises(InputError, match=r"none\.yml: cannot be read: No such file"):
         read_car(tmp_path / "none.yml")
 
 
@@ -62,7 +63,7 @@ def test_any_bytes_are_a_car_or_one_sentence(tmp_path_factory: pytest.TempPathFa
     path.write_bytes(data)
     try:
         car = read_car(path)
-    except CarError as error:
+    except InputError as error:
         assert str(error).startswith(str(path))
     else:
         assert car.mass > 0

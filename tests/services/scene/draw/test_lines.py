@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dodo_dsl import package_data
-from dodo_dsl.opendlv.assets.json_file import MapError
+from dodo_dsl.opendlv.assets.problem import InputError
 from services.scene.camera import CameraPose
 from services.scene.render import Renderer
 from services.scene.scene import TAPE, SceneOptions, load_scene
@@ -25,5 +25,5 @@ def test_tape_is_where_the_pinhole_puts_the_line(write_map):
 
 
 def test_an_unknown_line_is_told_with_those_that_there_are():
-    with pytest.raises(MapError, match=r"no obstacle 'middle' with lines; .* behind, beyond, finish"):
+    with pytest.raises(InputError, match=r"no obstacle 'middle' with lines; .* behind, beyond, finish"):
         load_scene(STRAIGHT, SceneOptions(lines=("middle",)))

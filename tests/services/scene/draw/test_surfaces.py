@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.assets.json_file import MapError
+from dodo_dsl.opendlv.assets.problem import InputError
 from services.scene.camera import CameraPose, Pinhole, View
 from services.scene.surfaces import Face, TextureMap, draw_backdrop, patches
 from services.scene.textures import Texture, default_ground, load_picture
@@ -143,5 +143,5 @@ def test_the_default_ground_has_structure_but_is_grey():
 def test_what_is_no_picture_is_told(tmp_path):
     for content in (b"", b"no picture"):
         (tmp_path / "a.png").write_bytes(content)
-        with pytest.raises(MapError, match=r"a\.png: not a readable image"):
+        with pytest.raises(InputError, match=r"a\.png: not a readable image"):
             load_picture(tmp_path / "a.png")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dodo_dsl.opendlv.assets import formats
-from dodo_dsl.opendlv.assets.json_file import MapError
+from dodo_dsl.opendlv.assets.problem import InputError
 from services.scene.meshes import load_obj
 from services.scene.scene import load_scene
 from tests.services.map_folders import CUBE
@@ -117,6 +117,6 @@ def test_materials_that_are_none_are_told_by_the_check_and_the_camera(library, m
     (folder / "my set.mtl").write_text(materials)
     (folder / "loop.mtl").symlink_to("loop.mtl")
     (problem,) = formats.problems("map", folder, {}, {})
-    with pytest.raises(MapError, match=said) as caught:
+    with pytest.raises(InputError, match=said) as caught:
         load_scene(folder)
     assert str(problem) == str(caught.value)

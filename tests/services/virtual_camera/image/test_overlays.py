@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.assets.json_file import MapError
+from dodo_dsl.opendlv.assets.problem import InputError
 from services.scene.scene import load_scene
 from services.virtual_camera.optics import Overlay, load_overlays
 
@@ -47,13 +47,13 @@ def test_overlays_that_make_no_sense_are_told(write_map):
         (overlay(place=(1, 2, 3)), r"overlay\[0\].instances\[0\]: expected the numbers \[x, y\]"),
         (overlay("none.png"), r"overlay\[0\].textureFile: expected a file"),
     ):
-        with pytest.raises(MapError, match=message):
+        with pytest.raises(InputError, match=message):
             load_scene(write_map({"overlay": [entry]}))
 
 
 def test_an_overlay_of_a_broken_picture_is_told(write_map):
     folder = write_map({"overlay": [overlay()]}, {"t.png": "no picture"})
-    with pytest.raises(MapError, match=r"t\.png: not a (readable )?image"):
+    with pytest.raises(InputError, match=r"t\.png: not a (readable )?image"):
         laid(folder)
 
 
