@@ -119,13 +119,6 @@ def test_a_column_that_is_almost_the_field_is_told(tmp_path: Path) -> None:
     assert found.what == "unknown column 'groundSteerng', did you mean 'groundSteering'?"
 
 
-def test_an_unknown_parameter_of_a_car_is_told(tmp_path: Path) -> None:
-    (tmp_path / "car.yml").write_text("mass: 1\nzzq: 1\n")
-    (found,) = formats.problems("car", tmp_path / "car.yml", {}, {})
-    assert found.position()[0] == 2
-    assert "zzq" in found.what
-
-
 def test_bodies_that_a_map_does_not_have_are_told(tmp_path: Path) -> None:
     (tmp_path / "map.json").write_text(json.dumps({"model": [{"frames": [0]}], "obstacles": []}))
     given = {"bodies": "true", "frame-id": "0"}

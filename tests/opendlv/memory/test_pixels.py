@@ -39,17 +39,3 @@ def test_the_order_of_the_bytes() -> None:
 def test_pictures_that_cannot_be(call: object, text: str) -> None:
     with pytest.raises(PixelError, match=text):
         call()  # type: ignore[operator]
-
-
-@pytest.mark.parametrize("kind", pixels.FORMATS)
-def test_a_picture_becomes_i420_as_by_way_of_bgr(kind: str) -> None:
-    picture = pixels.from_bgr(np.random.default_rng(1).integers(0, 256, (12, 16, 3), np.uint8), kind)
-    found = pixels.to_i420(picture, kind)
-    wanted = picture if kind == "i420" else pixels.from_bgr(pixels.to_bgr(picture, kind), "i420")
-    assert np.array_equal(found, wanted)
-
-
-@pytest.mark.parametrize("kind", ["argb", "bgr"])
-def test_one_of_odd_size_has_no_i420(kind: str) -> None:
-    with pytest.raises(pixels.PixelError, match="not 5 x 4"):
-        pixels.to_i420(pixels.view(bytes(80), kind, 5, 4), kind)

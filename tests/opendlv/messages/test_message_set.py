@@ -100,14 +100,6 @@ def test_numbers_that_do_not_fit_are_refused() -> None:
         STANDARD.encode(STANDARD.type("opendlv.system.LogMessage")(level=256))
 
 
-def test_names_and_ids() -> None:
-    steering = STANDARD.type("opendlv.proxy.GroundSteeringRequest")
-    assert steering is STANDARD.type(1090)
-    assert STANDARD.id(steering) == STANDARD.id(steering()) == 1090
-    assert STANDARD.name(1090) == steering.DESCRIPTOR.full_name
-    assert {"cluon.data.PlayerCommand", "dodo.TestBegin", "dodo.EndOfInput"} <= set(STANDARD.names())
-
-
 @pytest.mark.parametrize(
     ("key", "text"),
     [

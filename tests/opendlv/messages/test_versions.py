@@ -15,7 +15,7 @@ from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9
 from dodo_dsl.opendlv.recording import Recording
 
 SETS = {version: message_versions.load(version) for version in (OLD, NEW)}
-PROXY, SENSATION, PERCEPTION = "opendlv.proxy.", "opendlv.logic.sensation.", "opendlv.logic.perception."
+PERCEPTION = "opendlv.logic.perception."
 WHOLE = {
     # 1.0 of March 2024
     STANDARD: [
@@ -49,34 +49,6 @@ def test_names_and_ids_are_unique(version: str) -> None:
     assert [messages.id(messages.name(id_)) for id_ in messages.ids()] == list(messages.ids())
     assert {messages.name(id_).startswith("dodo.") for id_ in messages.ids() & set(OWN_IDS)} == {True}
     assert not any(messages.name(id_).startswith("dodo.") for id_ in messages.ids() - set(OWN_IDS))
-
-
-@pytest.mark.parametrize(
-    ("id_", "old", "new"),
-    [
-        (14, PROXY + "ImageReadingShared", PROXY + "ImageReadingShared"),
-        (19, PROXY + "GeodeticWgs84Reading", PROXY + "GeodeticWgs84PositionReading"),
-        (49, PROXY + "PointCloudReading", PROXY + "PointCloudReading"),
-        (1001, "opendlv.sim.Frame", None),
-        (1003, None, "opendlv.sim.Frame"),
-        (1017, SENSATION + "Equilibrioception", "opendlv.meta.CalibrationExtrinsic"),
-        (1021, "opendlv.body.ComponentInfo", "opendlv.meta.FrameShape"),
-        (1032, PROXY + "MagneticFieldReading", PROXY + "MagneticFieldReading"),
-        (1043, PROXY + "StateOfChargeReading", PROXY + "StateOfChargeReading"),
-        (1051, PROXY + "GeodeticHeadingReading", PROXY + "GeodeticWgs84HeadingReading"),
-        (1101, "opendlv.system.SystemOperationState", "opendlv.system.SystemStatusMessage"),
-        (1118, SENSATION + "Orientation", None),
-        (1119, None, SENSATION + "Orientation"),
-        (1128, PERCEPTION + "ObjectFrameStart", PERCEPTION + "ObjectFrameStart"),
-        (1130, PERCEPTION + "Object", PERCEPTION + "DetectionType"),
-        (1140, PERCEPTION + "GroundSurface", PERCEPTION + "GroundSurface"),
-        (1180, "opendlv.logic.action.GeodeticPath", "opendlv.logic.action.GlobalPath"),
-    ],
-)
-def test_what_an_id_means_in_each_set(id_: int, old: str | None, new: str | None) -> None:
-    for version, name in ((OLD, old), (NEW, new)):
-        assert (id_ in SETS[version].ids()) == (name is not None)
-        assert name is None or SETS[version].name(id_) == name
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 import os
 import subprocess
 import sys
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -158,14 +157,6 @@ def test_rows_by_message_sender_and_time(tmp_path: Path) -> None:
         assert list(batch.select(np.array([2, 0])).envelopes()) == [frames[2], frames[0]]
 
 
-@pytest.mark.slow
-def test_frames_larger_than_a_batch(tmp_path: Path) -> None:
-    frames = [Envelope(1055, os.urandom(1_000_000 * i), 1, 1, 9 - i, 0) for i in (15, 1, 9, 0)]
-    with Recording(write(tmp_path, b"".join(map(encode_frame, frames)))) as recording:
-        assert [len(batch) for batch in recording.batches()] == [1, 2, 1] or len(list(recording.batches())) > 1
-        assert list(recording.envelopes(recording.by_time())) == sorted(frames, key=lambda e: e.sample_time)
-
-
 def test_a_file_that_shrinks_is_told(tmp_path: Path) -> None:
     frame = encode_frame(Envelope(1, b"x", 1, 2, 3, 4))
     path = write(tmp_path, frame * 9)
@@ -226,29 +217,3 @@ def test_recordings_of_others(name: str, shared_data: Callable[[str], Path]) -> 
     assert b"".join(map(encode_frame, found)) == path.read_bytes()
     with Recording(path) as recording:
         assert list(recording.envelopes()) == found
-
-
-WRITER = """
-import sys, itertools
-from pathlib import Path
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.recording_writer import RecordingWriter
-assert "numpy" not in sys.modules
-with RecordingWriter(Path(sys.argv[1])) as writer:
-    for number in itertools.count():
-        writer.write(Envelope(1055, bytes(5000), 1, 1, number, 0))
-"""
-
-
-def test_a_killed_writer_leaves_a_readable_file(tmp_path: Path) -> None:
-    path = tmp_path / "killed.rec"
-    writer = subprocess.Popen([sys.executable, "-c", WRITER, str(path)])
-    deadline = time.monotonic() + 20.0
-    while not path.exists() or path.stat().st_size < 1_000_000:
-        assert time.monotonic() < deadline and writer.poll() is None
-        time.sleep(0.002)
-    writer.kill()
-    writer.wait()
-    found, damage = read(path)
-    assert [e.sample_time for e in found] == list(range(len(found))) and len(found) >= 190
-    assert damage.size < 5100, "at most the last frame"

@@ -208,14 +208,6 @@ def test_pictures(type_: str, format_: str, encoding: str) -> None:
         assert (found["step"], found["height"], found["width"]) == (24, 6, 8)
 
 
-def test_jpeg_and_rows_with_a_rest() -> None:
-    wanted = topic(ros.COMPRESSED, "video0.bgr", encoding="jpeg")
-    fields = TYPES.given(wanted, {}, TIME, CameraPicture(np.full((8, 8, 3), 90, np.uint8), "bgr"))
-    assert fields["format"] == "jpeg" and (picture_of(ros.COMPRESSED, fields) == 90).all()
-    padded = {"encoding": "mono8", "width": 2, "height": 2, "step": 3, "data": np.array([1, 2, 9, 3, 4, 9], np.uint8)}
-    assert picture_of(ros.IMAGE, padded)[:, :, 0].tolist() == [[1, 2], [3, 4]]
-
-
 SWITCH = "opendlv.proxy.SwitchStateReading"
 REFUSED = [
     (topic(ros.TWIST, ros.MOTION_REQUEST), {"linear": {"x": math.nan}}, "linear.x of /t is nan, which"),

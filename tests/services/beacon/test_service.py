@@ -1,19 +1,15 @@
 import math
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from dodo_dsl.opendlv.assets.trajectory import TrajectoryError
 from dodo_dsl.opendlv.message_set import MessageSet
-from dodo_dsl.opendlv.session import Session
 from services.base import Context
 from services.base.flags import load_manifest, parse
 from services.beacon.service import Beacon
-from tests.services.built import refusal
-from tests.services.process import PATIENCE, ROOT, receive, running, send
+from tests.services.process import ROOT
 
-FRAME, STATE = "opendlv.sim.Frame", "opendlv.sim.KinematicState"
 SECOND = 1_000_000
 
 
@@ -68,22 +64,3 @@ def test_the_state_is_sent_when_asked() -> None:
 def test_two_ways_are_one_too_many() -> None:
     with pytest.raises(TrajectoryError, match="--points and --length exclude each other"):
         service("--points=0 0,1 1", "--length=3")
-
-
-@pytest.mark.thorough
-def test_on_the_bus(cid: int, tmp_path: Path) -> None:
-    with (
-        Session(cid) as session,
-        running("beacon", tmp_path, f"--cid={cid}", "--length=0.1", "--speed=1", "--state-id=2") as process,
-    ):
-        assert receive(session, FRAME)[1].x == 0
-        send(session, "dodo.TestBegin")
-        _, end = receive(session, "dodo.EndOfInput")
-        assert end.source == "beacon"
-        assert process.wait(PATIENCE) == 0
-
-
-def test_a_bad_table_is_refused_with_its_place(tmp_path: Path) -> None:
-    (tmp_path / "path.csv").write_text("x,y\n0,0\n1,here\n")
-    words = f"{tmp_path}/path.csv:3:3: y: 'here' is not a finite number"
-    assert refusal("beacon", f"--path={tmp_path}/path.csv") == words

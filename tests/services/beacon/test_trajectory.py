@@ -49,18 +49,6 @@ def test_heading_turns_by_the_shorter_way_through_the_seam() -> None:
     assert trajectory.at(1).yaw_rate == pytest.approx(math.radians(10))
 
 
-def test_half_a_turn_goes_to_the_left() -> None:
-    trajectory = Trajectory(points((0, 0, 0.0, 0.0), (0, 0, -math.pi, 1.0)), speed=1)
-    assert trajectory.at(0.5).yaw == pytest.approx(math.pi / 2)
-
-
-def test_on_a_circle_it_looks_along_the_tangent() -> None:
-    angles = [math.radians(10 * n) for n in range(10)]
-    found = headings([PathPoint("", math.cos(a), math.sin(a)) for a in angles])
-    for angle, heading in zip(angles[1:-1], found[1:-1], strict=True):
-        assert heading == pytest.approx(angle + math.pi / 2)
-
-
 def test_standing_still_it_looks_as_before() -> None:
     assert headings(points((0, 0), (0, 0), (0, 1), (0, 1), (0, 2))) == pytest.approx([math.pi / 2] * 5)
 
@@ -71,11 +59,6 @@ def test_a_straight_way_with_and_without_end() -> None:
     assert (trajectory.at(2).x, trajectory.at(2).y, trajectory.at(2).z) == pytest.approx((1, 3, 0.1))
     endless = straight(0, 0, 0, 0, None, 0.5)
     assert (endless.duration, endless.at(1000).x) == (math.inf, 500)
-
-
-def test_velocities_are_along_the_body() -> None:
-    pose = Trajectory(points((0, 0, math.pi / 2, 0.0), (1, 0, math.pi / 2, 1.0)), speed=1).at(0.5)
-    assert pose.body_velocity == pytest.approx((0, -1, 0))
 
 
 @given(st.lists(st.tuples(*[st.floats(-9, 9)] * 3, st.floats(0.01, 3)), min_size=2, max_size=6), st.floats(0, 20))

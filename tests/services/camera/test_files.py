@@ -40,9 +40,3 @@ def test_a_recording(shared_data) -> None:  # type: ignore[no-untyped-def]
     first, second = camera.read(), camera.read()
     assert first.argb.shape == second.argb.shape == (360, 640, 4)
     assert first.argb.std() > 20 and (first.argb != second.argb).any()
-
-
-def test_a_recording_without_pictures(tmp_path: Path) -> None:
-    (tmp_path / "empty.rec").write_bytes(b"")
-    with pytest.raises(ValueError, match=r"has no pictures|cannot be read here"):
-        FileCamera(tmp_path / "empty.rec", 64, 48)

@@ -7,11 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
-from services.camera.sources import V4l2Camera
 from tests.services.built import built, refusal
-from tests.services.process import PATIENCE, launch, receive, running
+from tests.services.process import PATIENCE, launch, running
 
 SIZE = ["--width=64", "--height=48"]
 
@@ -45,42 +43,6 @@ def test_a_video_goes_into_both_memories_at_its_times(tmp_path: Path, names: lis
     assert all(gap % 50_000 == 0 and gap > 0 for gap in np.diff(times))
     assert all(any(abs(grey - shown) <= 2 for shown in (40, 80, 120, 160, 200)) for grey in greys)
     assert len(set(greys)) > 1
-
-
-@pytest.mark.realtime
-def test_the_pipe_of_a_raspberry_pi(tmp_path: Path, names: list[str], rpicam: Path) -> None:
-    before = time.time_ns() // 1000
-    with running("camera", tmp_path, *names, *SIZE, "--source=rpicam", "--freq=20", "--exposure=0.05") as process:
-        argb, i420 = attached(names)
-        with argb, i420:
-            assert i420.wait(PATIENCE)
-            with i420.lock():
-                assert before < i420.sample_time() <= time.time_ns() // 1000
-                planes = np.frombuffer(i420.buffer, np.uint8).reshape(72, 64)
-                assert planes[0, 0] > 16 and (planes[48:] == 128).all()
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(PATIENCE) == 0
-
-
-@pytest.mark.realtime
-def test_its_state_is_told_under_the_stamp_that_is_given(
-    tmp_path: Path, cid: int, names: list[str], video: Path
-) -> None:
-    flags = [*names, *SIZE, "--source=file", f"--file={video}", "--freq=20", "--status-id=6"]
-    with Session(cid) as session, running("camera", tmp_path, *flags):
-        state = receive(session, "opendlv.system.SystemStatusMessage", 6)[1]
-    assert (state.code, state.description) == (0, "the camera gives pictures")
-
-
-@pytest.mark.realtime
-def test_a_camera_that_is_lost_ends_it_with_a_sentence(
-    tmp_path: Path, names: list[str], rpicam: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("FAKE_MODE", "lost")
-    process = launch("camera", tmp_path, *names, *SIZE, "--source=rpicam", "--freq=20", "--exposure=0.05")
-    _, err = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 1
-    assert "rpicam-vid ended with code 1: ERROR: *** Device timeout detected ***" in err and "Traceback" not in err
 
 
 @pytest.mark.realtime
@@ -152,13 +114,3 @@ def test_each_update_shares_a_picture_and_reports_on_the_camera(names: list[str]
 def test_what_is_not_a_camera(names: list[str], flags: list[str], words: str) -> None:
     size = [word for word in SIZE if word.partition("=")[0] not in {flag.partition("=")[0] for flag in flags}]
     assert words in refusal("camera", *names[1:], *size, *flags)
-
-
-def test_a_v4l2_device() -> None:
-    devices = sorted(Path("/dev").glob("video*"))
-    if not devices:
-        pytest.skip("there is no V4L2 device here (/dev/video*)")
-    camera = V4l2Camera(devices[0], 640, 480, 10, 0.1)
-    picture = camera.read()
-    camera.close()
-    assert picture.argb.shape == (480, 640, 4) and picture.time is not None

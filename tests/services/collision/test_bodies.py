@@ -18,7 +18,7 @@ BOX = VehicleBox(0.36, 0.16)
 WEDGE = "v 0.1 0.2 0\nv -0.1 0.2 0\nv 0 -0.3 0\nv 0 0.2 0.3\nv 9 9 9\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 """Pointed along -y, which is the front of a model at a frame; a vertex belongs to no face."""
 TRIANGLE = shapely.Polygon([(0.3, 0.0), (-0.2, 0.1), (-0.2, -0.1)])
-BEGIN, STEP = 1_700_000_000_000_000, 10_000
+BEGIN = 1_700_000_000_000_000
 
 
 def sampled(own: tuple[VehiclePose, VehiclePose], its: tuple[VehiclePose, VehiclePose], count: int = 400) -> float:

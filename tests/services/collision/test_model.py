@@ -92,37 +92,10 @@ def test_a_wall_touched_is_a_failure() -> None:
     }
 
 
-def test_touching_is_hitting() -> None:
-    track = Track({"left": line(-1, 0.08, 1, 0.08)}, {}, 1.0)
-    it = judge(track)
-    drive(it, (0, 0, -0.5, 0), (1, 0, 0, 0))
-    assert decided(it).reason == "hit wall left after 1.00 s at x = 0.00 m, y = 0.00 m"
-
-
-def test_no_place_is_written_as_minus_zero() -> None:
-    it = judge()
-    drive(it, (0, 0.5, 0, 0), (1, -0.001, -0.19, 0))
-    assert decided(it).reason == "hit wall right after 1.00 s at x = 0.00 m, y = -0.19 m"
-
-
 def test_wall_and_goal_in_one_frame_is_a_failure() -> None:
     it = judge()
     drive(it, (0, 0, 0, 0), (2, 3.5, 0.15, 0))
     assert (decided(it).outcome, decided(it).reason[:13]) == ("failed", "hit wall left")
-
-
-def test_a_fast_vehicle_does_not_jump_over_the_goal() -> None:
-    it = judge()
-    drive(it, (0, 0, 0, 0), (0.1, 10, 0, 0))
-    assert decided(it).reason == "reached finish after 0.10 s"
-
-
-def test_the_first_verdict_stands() -> None:
-    it = judge()
-    drive(it, (0, 0, 0, 0), (1, 3, 0, 0), (2, 3, 1, 0))
-    it.end_of_input(BEGIN + 2 * SECOND)
-    it.update(BEGIN + 100 * SECOND)
-    assert decided(it).outcome == "passed"
 
 
 def test_out_of_time_says_where_and_how_far() -> None:
@@ -140,38 +113,6 @@ def test_out_of_time_says_where_and_how_far() -> None:
     assert oks(it) == {
         "time-to-goal": False, "to-goal": False, "wall-margin": True, "distance": True, "max-speed": True
     }  # fmt: skip
-
-
-def test_a_goal_reached_too_late_is_not_reached() -> None:
-    it = judge()
-    drive(it, (0, 0, 0, 0), (39, 2, 0, 0), (40.01, 3, 0, 0))
-    assert decided(it).outcome == "failed"
-
-
-@pytest.mark.parametrize(
-    ("heard", "aside"),
-    [
-        ([REQUESTS[0]], "; the application sent no PedalPositionRequest"),
-        ([REQUESTS[1]], "; the application sent no GroundSteeringRequest"),
-    ],
-)
-def test_one_kind_of_request_missing_is_said(heard: list[str], aside: str) -> None:
-    it = judge(requests=heard)
-    drive(it, (0, 0, 0, 0))
-    it.update(BEGIN + 41 * SECOND)
-    assert decided(it).reason == (
-        f"did not reach finish within 40.00 s: the vehicle is at x = 0.00 m, y = 0.00 m, 2.82 m from it{aside}"
-    )
-
-
-def test_a_silent_application_fails() -> None:
-    it = judge(requests=[])
-    drive(it, (0, 0, 0, 0))
-    it.update(BEGIN + 41 * SECOND)
-    assert (decided(it).outcome, decided(it).reason) == (
-        "failed",
-        "the application sent no GroundSteeringRequest and no PedalPositionRequest within 40.00 s",
-    )
 
 
 def test_without_a_pose_there_is_no_verdict() -> None:
@@ -213,19 +154,6 @@ def test_without_a_goal_staying_clear_is_enough() -> None:
         assert decided(it).outcome == "passed"
         assert list(values(it)) == ["wall-margin", "distance", "max-speed"]
     assert decided(it).reason == "stayed clear of left and right until the input ended after 1.00 s"
-
-
-def test_without_a_goal_a_silent_application_fails() -> None:
-    it = judge(Track(LANE.walls, {}, 2.0), requests=[])
-    drive(it, (0, 0, 0, 0))
-    it.end_of_input(BEGIN + 2 * SECOND)
-    assert decided(it).reason.startswith("the application sent no GroundSteeringRequest and no PedalPosition")
-
-
-def test_without_walls_no_margin_is_checked() -> None:
-    it = judge(Track({}, LANE.goal, 2.0))
-    drive(it, (0, 0, 0, 0), (1, 3, 0, 0))
-    assert list(values(it)) == ["time-to-goal", "to-goal", "distance", "max-speed"]
 
 
 LAP = replace(LANE, gates=(("east", line(1, -0.2, 1, 0.2)), ("west", line(2, -0.2, 2, 0.2))))
@@ -279,14 +207,6 @@ def test_gates_and_goal_in_one_frame_count_in_the_order_of_the_way() -> None:
     assert decided(backwards).reason == "reached finish after 2.00 s"
 
 
-def test_with_all_gates_crossed_the_goal_is_what_was_missed() -> None:
-    it = judge(LAP)
-    drive(it, (0, 0, 0, 0), (2, 2.5, 0, 0))
-    it.end_of_input(BEGIN + 2 * SECOND)
-    assert decided(it).reason.startswith("did not reach finish before the input ended after 2.00 s: ")
-    assert oks(it)["gates"]
-
-
 def test_a_lap_may_begin_on_the_line_where_it_ends() -> None:
     it = judge(LAP)
     drive(it, (0, 3, 0, 0), (1, 0, 0, 0), (2, 2.5, 0, 0), (3, 3, 0, 0))
@@ -323,12 +243,6 @@ def test_a_value_beyond_its_limit_does_not_look_like_it(value: float, text: str)
     assert told(value, 0.07) == text
 
 
-def test_a_margin_kept_is_a_check_with_its_limit() -> None:
-    it = judge(replace(LANE, min_margin=0.05))
-    drive(it, (0, 0, 0, 0), (1, 3, 0.0699, 0))
-    assert decided(it).outcome == "passed" and oks(it)["wall-margin"]
-
-
 def test_a_hit_is_said_rather_than_the_margin_and_the_margin_rather_than_the_goal() -> None:
     it = judge(replace(LANE, min_margin=0.05))
     drive(it, (0, 0, 0, 0), (1, 0.5, 0.15, 0))
@@ -353,23 +267,6 @@ def test_time_zero_is_the_first_request_when_it_comes_before_the_begin() -> None
     it.begin(BEGIN + 6 * SECOND)
     it.look(VehiclePose(3, 0, 0), BEGIN + 8 * SECOND)
     assert decided(it).reason == "reached finish after 3.00 s"
-
-
-def test_time_zero_is_the_update_after_a_request_when_none_was_before() -> None:
-    it = TrackEvaluator(LANE, VehicleBox(0.36, 0.16))
-    it.request(REQUESTS[0])
-    it.look(VehiclePose(0, 0, 0), BEGIN)
-    it.update(BEGIN + SECOND)
-    it.look(VehiclePose(3, 0, 0), BEGIN + 4 * SECOND)
-    assert decided(it).reason == "reached finish after 3.00 s"
-
-
-def test_time_zero_is_the_first_update_when_neither_comes() -> None:
-    it = TrackEvaluator(LANE, VehicleBox(0.36, 0.16))
-    it.update(BEGIN)
-    it.look(VehiclePose(0, 0, 0), BEGIN + 2 * SECOND)
-    it.look(VehiclePose(3, 0, 0), BEGIN + 4 * SECOND)
-    assert decided(it).reason.endswith("although the vehicle reached finish after 4.00 s")
 
 
 def test_a_goal_that_the_application_did_not_drive_to_is_no_pass() -> None:
@@ -417,12 +314,6 @@ def test_a_goal_reached_in_silence_is_no_pass() -> None:
     assert decided(it).outcome == "passed" and values(it)["silence"] == pytest.approx(1.9) and oks(it)["silence"]
 
 
-def test_staying_clear_in_silence_is_no_pass() -> None:
-    it = hanging(Track(LANE.walls, {}, 20.0))
-    it.end_of_input(BEGIN + 4 * SECOND)
-    assert decided(it).reason == "no request came between 1.50 s and 4.00 s (at most 2 s)"
-
-
 def test_requests_count_by_their_arrival() -> None:
     it = hanging()
     it.arrived = BEGIN + 3_400_000
@@ -440,12 +331,6 @@ def test_the_begin_forgets_what_was_before() -> None:
     assert values(it)["distance"] == pytest.approx(3)
     assert values(it)["wall-margin"] == pytest.approx(0.12)
     assert values(it)["max-speed"] == pytest.approx(0.5 / 1.001)
-
-
-def test_poses_that_are_not_newer_are_ignored() -> None:
-    it = judge()
-    drive(it, (0, 0, 0, 0), (2, 1, 0, 0), (1, 9, 0, 0), (2, 9, 0, 0))
-    assert it.verdict is None
 
 
 @given(st.lists(st.tuples(st.floats(-0.5, 4), st.floats(-0.3, 0.3), st.floats(-180, 180)), min_size=1, max_size=8))
@@ -480,13 +365,6 @@ def test_a_vehicle_that_is_too_fast_fails_at_once() -> None:
     assert decided(it).outcome == "failed"
     assert decided(it).reason == "drove 1.005 m/s after 1.50 s at x = 1.80 m, y = 0.05 m, expected at most 0.8 m/s"
     assert oks(it)["max-speed"] is False
-
-
-def test_a_speed_within_its_limit_is_kept() -> None:
-    it = judge(replace(LANE, max_speed=2.0))
-    drive(it, (0.0, 0.5, 0, 0), (2.0, 3.0, 0, 0))
-    assert decided(it).outcome == "passed"
-    assert oks(it)["max-speed"] is True
 
 
 def test_what_is_recorded_is_what_was_judged() -> None:

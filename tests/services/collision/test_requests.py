@@ -24,13 +24,6 @@ def test_the_longest_silence_against_numpy(times: list[int], most: float, rest: 
     assert (fault is not None) == (rest > most * SECOND)
 
 
-def test_the_silence_is_named_from_the_begin_of_the_test() -> None:
-    requests = Requests(max_silence=2.0)
-    requests.take(REQUESTS[1], 12 * SECOND)
-    assert requests.fault(14 * SECOND, 10 * SECOND) is None
-    assert requests.fault(14_010_000, 10 * SECOND) == "no request came between 2.00 s and 4.01 s (at most 2 s)"
-
-
 def test_silence_before_the_first_request_and_before_the_begin_does_not_count() -> None:
     requests = Requests(max_silence=2.0)
     assert requests.fault(50 * SECOND, 0) is None and requests.is_silent

@@ -1,7 +1,6 @@
 import json
 import math
 import re
-import subprocess
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -10,12 +9,10 @@ from typing import Any
 import pytest
 
 from dodo_dsl.opendlv.message_set import MessageSet
-from dodo_dsl.opendlv.session import Session
-from services.base import Check, Context, Flags, UnjudgeableError
+from services.base import Context, Flags, UnjudgeableError
 from services.collision.model import REQUESTS
 from services.collision.service import Collision
-from tests.services.built import built, hand, refusal
-from tests.services.process import PATIENCE, running, send
+from tests.services.built import hand
 
 FRAME = "opendlv.sim.Frame"
 LANE = {
@@ -180,84 +177,6 @@ def test_frames_of_bodies_are_judged(lane: Path) -> None:
         judge.inputs[FRAME, 2](frame(x, 0.0), at)
     assert judge.verdict is not None
     assert judge.verdict.reason == "hit body car after 1.00 s at x = 2.00 m, y = 0.00 m"
-
-
-def finished(process: subprocess.Popen[str]) -> tuple[int, str, str]:
-    output, errors = process.communicate(timeout=PATIENCE)
-    return process.returncode, output, errors
-
-
-@pytest.mark.thorough
-def test_the_verdict_is_one_line_and_the_end(lane: Path, cid: int) -> None:
-    flags = (f"--cid={cid}", f"--map-path={lane}", "--goal=finish", "--walls=left,right")
-    with Session(cid) as session, running("collision", lane, *flags) as process:
-        start = time.time_ns() // 1000 - 3_000_000  # so that its time is not over
-        send(session, "dodo.TestBegin", sample_time=start)
-        send(session, "opendlv.proxy.PedalPositionRequest", position=0.1)
-        send(session, FRAME, sample_time=start + 10_000, qw=1.0)
-        send(session, FRAME, sample_time=start + 2_010_000, x=2.9, y=0.05, qw=1.0)
-        code, output, errors = finished(process)
-    assert (code, errors) == (0, "")
-    verdict = json.loads(output.splitlines()[-1])
-    assert (verdict["dodo"], verdict["outcome"], verdict["reason"]) == (
-        "verdict",
-        "passed",
-        "reached finish after 2.01 s",
-    )
-    checks = {check["name"]: check for check in verdict["checks"]}
-    assert checks["time-to-goal"] == {
-        "name": "time-to-goal", "value": 2.01, "limit": {"max": 60}, "unit": "s", "ok": True
-    }  # fmt: skip
-    assert checks["wall-margin"]["value"] == pytest.approx(0.07, abs=1e-6)
-
-
-def test_gates_and_margin_come_from_the_flags(lane: Path) -> None:
-    with built("collision", f"--map-path={lane}", "--gates=finish", "--walls=left,right", "--min-margin=0.05") as judge:
-        judge.begin(START)
-        hand(judge, REQUESTS[0], START)
-        hand(judge, FRAME, START + 10_000, 0, qw=1.0)
-        hand(judge, FRAME, START + 2_010_000, 0, x=3.1, qw=1.0)
-    assert (judge.verdict.outcome, judge.verdict.reason) == ("passed", "crossed the last gate, finish, after 2.01 s")
-    checks = {check.name: check for check in judge.verdict.checks}
-    assert checks["gates"] == Check("gates", 1, {"min": 1}, "", True)
-    assert checks["wall-margin"].limit == {"min": 0.05}
-
-
-def test_requests_may_be_others(lane: Path) -> None:
-    mine = ("opendlv.proxy.TorqueRequest", 3)
-    flags = (f"--map-path={lane}", "--goal=finish", f"--requests={mine[0]}/3", "--max-silence=0.5")
-    with built("collision", *flags) as judge:
-        assert set(judge.inputs) == {(FRAME, 0), mine}
-        judge.begin(START)
-        judge.update(START)
-        hand(judge, mine[0], START, mine[1])
-        hand(judge, FRAME, START, 0, qw=1.0)
-        judge.update(START + 510_000)
-    assert judge.verdict.reason == "no request came between 0.00 s and 0.51 s (at most 0.5 s)"
-
-
-def test_the_end_of_the_input_of_a_silent_application(lane: Path) -> None:
-    with built("collision", f"--map-path={lane}", "--goal=finish") as judge:
-        judge.begin(START)
-        hand(judge, FRAME, START, 0, qw=1.0)
-        judge.end_of_input(START + 500_000)
-    verdict = json.loads(judge.verdict.line())
-    assert (verdict["outcome"], verdict["reason"]) == (
-        "failed",
-        "the application sent no GroundSteeringRequest and no PedalPositionRequest before the input ended after 0.50 s",
-    )
-
-
-def test_no_frame_is_an_error_and_no_verdict(lane: Path) -> None:
-    with built("collision", f"--map-path={lane}", "--walls=left", "--min-distance=1", "--max-time=0.05") as judge:
-        judge.begin(START)
-        with pytest.raises(UnjudgeableError, match=r"no opendlv\.sim\.Frame of the vehicle came within 0\.05 s"):
-            judge.update(START + 60_000)
-
-
-def test_a_wrong_name_is_refused(lane: Path) -> None:
-    sentence = f"--goal: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"
-    assert refusal("collision", f"--map-path={lane}", "--goal=finnish") == sentence
 
 
 def test_a_block_of_the_map_is_hit(lane: Path) -> None:

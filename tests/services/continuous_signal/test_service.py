@@ -1,7 +1,4 @@
 import json
-import math
-import subprocess
-import time
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +6,11 @@ import pytest
 
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
-from dodo_dsl.opendlv.session import Session
 from services.base import Context, Flags
 from services.base.flags import load_manifest, parse
 from services.continuous_signal.service import ContinuousSignal
-from tests.services.built import refusal
 from tests.services.continuous_signal.test_target import recording
-from tests.services.process import PATIENCE, ROOT, running, send
+from tests.services.process import ROOT
 
 STEERING = "opendlv.proxy.GroundSteeringRequest"
 START = 1_700_000_000_000_000
@@ -118,68 +113,6 @@ def test_a_test_without_a_limit_is_refused(table: Path) -> None:
         ContinuousSignal(Context("continuous-signal", open_ended, MessageSet.standard()))
 
 
-def finished(process: subprocess.Popen[str]) -> tuple[int, str, str]:
-    output, errors = process.communicate(timeout=PATIENCE)
-    return process.returncode, output, errors
-
-
-@pytest.mark.thorough
-def test_the_verdict_on_the_bus(table: Path, cid: int, tmp_path: Path) -> None:
-    start = time.time_ns() // 1000 - 10_100_000
-    limits = ("--band=0.05", "--min-share=0.5", "--max-delay=60")
-    words = (f"--cid={cid}", *FLAGS, f"--target={table}", *limits)
-    with Session(cid) as session, running("continuous_signal", tmp_path, *words) as process:
-        send(session, "dodo.TestBegin", sample_time=start)
-        for step in range(101):
-            value = step / 100 + 0.04 * math.sin(step)
-            send(session, STEERING, sample_time=start + step * 100_000, groundSteering=value)
-            send(session, STEERING, sender_stamp=1, sample_time=start + step * 100_000, groundSteering=9.0)
-        send(session, "dodo.EndOfInput", source="recording")
-        code, output, errors = finished(process)
-    assert (code, errors) == (0, "")
-    verdict = json.loads(output.splitlines()[-1])
-    assert (verdict["dodo"], verdict["outcome"]) == ("verdict", "passed")
-    checks = {check["name"]: check for check in verdict["checks"]}
-    expected = sum(abs(0.04 * math.sin(step)) for step in range(101)) / 101
-    assert checks["mean"] == {
-        "name": "mean", "value": pytest.approx(expected, abs=1e-6), "limit": {"max": 0.05}, "unit": "", "ok": True
-    }  # fmt: skip
-    assert checks["samples"]["value"] == 101
-
-
-@pytest.mark.thorough
-def test_another_sender_stamp_is_part_of_the_reason(table: Path, cid: int, tmp_path: Path) -> None:
-    start = time.time_ns() // 1000
-    with (
-        Session(cid) as session,
-        running("continuous_signal", tmp_path, f"--cid={cid}", *FLAGS, f"--target={table}") as it,
-    ):
-        send(session, "dodo.TestBegin", sample_time=start)
-        for step in range(3):
-            send(session, STEERING, sender_stamp=99, sample_time=start + step)
-        send(session, "dodo.EndOfInput", source="recording")
-        code, output, _ = finished(it)
-    verdict = json.loads(output.splitlines()[-1])
-    assert (code, verdict["outcome"]) == (0, "failed")
-    assert verdict["reason"].startswith(f"no sample of groundSteering of {STEERING}/0 came before the input ended")
-    assert verdict["reason"].endswith(f"; no {STEERING}/0 came, but 3 with sender stamp 99")
-
-
-def test_by_default_silence_and_times_far_from_the_arrival_fail(table: Path) -> None:
-    judge = service(f"--target={table}")
-    judge.begin(START)
-    for step in range(50):
-        judge.arrived = START + step * 100_000
-        judge.inputs[STEERING, 0](steering(step / 100), START + step * 100_000)
-    for step in range(50, 100):
-        judge.arrived = START + 9_900_000
-        judge.inputs[STEERING, 0](steering(step / 100), START + step * 100_000 - 2_000_000)
-    judge.end_of_input(START + 10_000_000)
-    assert judge.verdict is not None and judge.verdict.outcome == "failed"
-    assert judge.verdict.reason.startswith("nothing came between 4.90 s and 10.00 s (at most 1 s); the samples cover ")
-    assert "left out: 50 samples whose time is not that of the arrival" in judge.verdict.reason
-
-
 def test_a_silent_application_fails_when_the_time_is_over(table: Path) -> None:
     judge = service(f"--target={table}", "--max-time=0.05")
     judge.begin(START)
@@ -188,10 +121,3 @@ def test_a_silent_application_fails_when_the_time_is_over(table: Path) -> None:
     verdict = json.loads(judge.verdict.line())
     assert verdict["reason"] == f"no sample of groundSteering of {STEERING}/0 came within 0.05 s"
     assert verdict["checks"][0] == {"name": "mean", "value": None, "limit": {"max": 0.05}, "unit": "", "ok": False}
-
-
-def test_a_target_that_cannot_be_used_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "bad.csv").write_text("time,value\n0,1\n0,2\n")
-    assert refusal("continuous_signal", *FLAGS, f"--target={tmp_path}/bad.csv") == (
-        f"{tmp_path}/bad.csv:3:1: the time '0' is not after 0 s, that of the row before"
-    )

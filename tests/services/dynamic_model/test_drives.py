@@ -63,11 +63,6 @@ def test_two_wheels_roll_on_the_circle_of_their_speeds(left: float, right: float
     assert vehicle.motion.vx == pytest.approx(0.03 * (left + right) / 2, rel=1e-6)
 
 
-def test_opposite_wheels_turn_on_the_spot() -> None:
-    motion = driven(DifferentialDrive(WHEELS, by_axle=True), 3.0, {LEFT: -5.0, RIGHT: 5.0}).motion
-    assert (motion.vx, motion.yaw_rate) == (pytest.approx(0.0, abs=1e-12), pytest.approx(2.0))
-
-
 @pytest.mark.parametrize("freq", [50, 100, 1000])
 def test_a_wheel_follows_the_first_order_response_whatever_the_steps(freq: int) -> None:
     drive = DifferentialDrive(replace(WHEELS, friction=5.0), by_axle=True)
@@ -133,12 +128,6 @@ def test_the_speed_follows_the_first_order_response(has_tyres: bool) -> None:
 
 
 @pytest.mark.parametrize("has_tyres", [False, True])
-def test_a_short_lag_is_no_shorter_than_the_steps(has_tyres: bool) -> None:
-    vehicle = driven(BicycleDrive(replace(CAR, speed_lag=0.01), has_tyres), 2.0, {SPEED: 1.5, STEERING: 0.3}, freq=1)
-    assert vehicle.motion.vx == pytest.approx(1.5)
-
-
-@pytest.mark.parametrize("has_tyres", [False, True])
 def test_motor_brakes_and_ground_limit_the_acceleration(has_tyres: bool) -> None:
     def gained(start: float, asked: float, power: float = 1.0, friction: float = 1.0) -> float:
         drive = BicycleDrive(replace(CAR, friction=friction), has_tyres, by_speed=False, power=power)
@@ -171,12 +160,6 @@ def test_a_steady_turn_has_the_understeer_gradient(speed: float) -> None:
     motion = driven(BicycleDrive(CAR, True), 14.0, {STEERING: 0.004, SPEED: speed}).motion
     gradient = 1500 / 2.7 * (1.5 / 90_000 - 1.2 / 110_000)
     assert motion.yaw_rate == pytest.approx(motion.vx * 0.004 / (2.7 + gradient * motion.vx**2), rel=2e-3)
-
-
-def test_the_ground_holds_the_car_no_better_than_its_friction() -> None:
-    for has_tyres in (False, True):
-        motion = driven(BicycleDrive(replace(CAR, friction=0.3), has_tyres), 9.0, {STEERING: 0.3, SPEED: 15.0}).motion
-        assert abs(motion.vx * motion.yaw_rate) <= 0.3 * GRAVITY * 1.01
 
 
 def equations(car: SingleTrack, asked: float) -> Callable[[float, list[float]], list[float]]:

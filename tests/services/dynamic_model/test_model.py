@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.assets.car import KIWI
-from services.dynamic_model.model import BodyMotion, Condition, Vehicle, pedal_position, step, wheel_angle
+from services.dynamic_model.model import BodyMotion, Condition, Vehicle, pedal_position, wheel_angle
 
 SECOND = 1_000_000
 
@@ -24,26 +24,6 @@ def test_steady_speed(pedal: float, speed: float) -> None:
     assert drive(vehicle, 10).vx == pytest.approx(speed, abs=1e-9)
 
 
-def test_speed_follows_the_first_order_response() -> None:
-    vehicle = Vehicle()
-    vehicle.press(0.1)
-    for millisecond in range(0, 2001):
-        vehicle.update(millisecond * 1000)
-        exact = (
-            KIWI.gain_forward
-            * 0.1
-            / KIWI.resistance
-            * (1 - math.exp(-KIWI.resistance / KIWI.mass * millisecond / 1000))
-        )
-        assert vehicle.motion.vx == pytest.approx(exact, abs=1e-3)
-
-
-@pytest.mark.parametrize("vx", [0.0, 0.1, -0.1, 0.05])
-def test_tyres_carry_nothing_sideways_at_low_speed(vx: float) -> None:
-    after = step(BodyMotion(vx, 0.3, 2.0), 0.6, 0.0, 0.01)
-    assert (after.vy, after.yaw_rate) == (0.0, 0.0)
-
-
 def test_steady_turn_agrees_with_the_linear_single_track_model() -> None:
     vehicle = Vehicle()
     vehicle.press(0.1)
@@ -56,16 +36,6 @@ def test_steady_turn_agrees_with_the_linear_single_track_model() -> None:
     assert KIWI.inertia > 0 and motion.yaw_rate > 0
 
 
-def test_left_is_positive_and_right_its_mirror() -> None:
-    left, right = Vehicle(), Vehicle()
-    for vehicle, sign in ((left, 1), (right, -1)):
-        vehicle.press(0.1)
-        vehicle.steer(sign * 0.15)
-    a, b = drive(left, 2), drive(right, 2)
-    assert a.yaw_rate > 0.5
-    assert (b.vx, b.vy, b.yaw_rate) == (a.vx, -a.vy, -a.yaw_rate)
-
-
 def test_requests_are_scaled_and_limited() -> None:
     assert wheel_angle(0.290888) == pytest.approx(0.6)
     assert wheel_angle(0.1) == pytest.approx(0.2062649, abs=1e-7)
@@ -73,37 +43,11 @@ def test_requests_are_scaled_and_limited() -> None:
     assert (pedal_position(0.05), pedal_position(0.5), pedal_position(-1)) == (0.05, 0.14, -0.9)
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_requests_that_are_no_numbers_change_nothing(value: float) -> None:
-    vehicle, same = Vehicle(), Vehicle()
-    for each in (vehicle, same):
-        assert each.press(0.1) and each.steer(0.1)
-    assert not vehicle.press(value) and not vehicle.steer(value)
-    assert drive(vehicle, 1) == drive(same, 1)
-
-
-def test_the_first_update_advances_nothing() -> None:
-    vehicle = Vehicle()
-    vehicle.press(0.14)
-    assert vehicle.update(5 * SECOND) == BodyMotion()
-    assert vehicle.update(5 * SECOND + 10_000).vx == pytest.approx(-0.91 * math.expm1(-0.04 / KIWI.mass), rel=1e-4)
-
-
 def test_time_does_not_run_backwards() -> None:
     vehicle = Vehicle()
     vehicle.update(10)
     with pytest.raises(ValueError, match="backwards by 3 us"):
         vehicle.update(7)
-
-
-def test_a_long_pause_is_taken_in_steps_of_the_period() -> None:
-    once, often = Vehicle(), Vehicle()
-    for vehicle in (once, often):
-        vehicle.press(0.1)
-        vehicle.steer(0.2)
-        vehicle.update(0)
-    once.update(3 * SECOND)
-    assert once.motion == drive(often, 3)
 
 
 @given(st.integers(1, 2_000_000))
@@ -114,35 +58,6 @@ def test_however_seldom_it_is_updated_the_steps_are_fine_and_lose_no_time(elapse
     vehicle.update(elapsed)
     limit, decay = KIWI.gain_forward * 0.1 / KIWI.resistance, KIWI.resistance / KIWI.mass * elapsed / SECOND
     assert vehicle.motion.vx == pytest.approx(-limit * math.expm1(-decay), rel=1e-4)
-
-
-def test_the_public_scheme_is_not_far_away() -> None:
-    """Explicit Euler at 100 Hz, where it is stable: it is late by less than half a step, and settles to the same."""
-    vehicle, motion = Vehicle(), BodyMotion(0.5)
-    vehicle.motion = motion
-    vehicle.press(0.12)
-    vehicle.steer(0.2)
-    wheel = wheel_angle(0.2)
-    for tick in range(301):
-        assert vehicle.update(tick * 10_000).vx == pytest.approx(motion.vx, abs=2e-3)
-        assert tick < 10 or vehicle.motion.yaw_rate == pytest.approx(motion.yaw_rate, abs=0.02)
-        vx, vy, r = motion.vx, motion.vy, motion.yaw_rate
-        front, rear = wheel - (vy + 0.12 * r) / vx, (0.104 * r - vy) / vx
-        motion = BodyMotion(
-            vx + 0.01 * (26 * 0.12 - 4 * vx) / 1.113,
-            vy + 0.01 * (15 * (front + rear) / 1.113 - vx * r),
-            r + 0.01 * 15 * (0.12 * front - 0.104 * rear) / 0.01,
-        )
-    assert (vehicle.motion.vy, vehicle.motion.yaw_rate) == (pytest.approx(vy, abs=1e-4), pytest.approx(r, abs=1e-4))
-
-
-def test_reset_is_standing_still() -> None:
-    vehicle = Vehicle()
-    vehicle.press(0.1)
-    vehicle.steer(0.2)
-    assert drive(vehicle, 1).vx > 0
-    vehicle.reset()
-    assert drive(vehicle, 1, start=SECOND) == BodyMotion()
 
 
 def test_a_car_that_is_not_stable_is_an_error_and_not_a_state() -> None:
@@ -167,16 +82,6 @@ def test_a_request_acts_after_the_latency_and_not_before(latency: int, period: i
         now += period
         late.update(now)
     assert prompt.update(now).vx == pytest.approx(late.motion.vx, rel=0.02)
-
-
-def test_requests_that_come_while_others_are_under_way_act_in_their_order() -> None:
-    vehicle = Vehicle(condition=Condition(latency=0.1))
-    speeds = []
-    for now in range(0, 1_000_001, 10_000):
-        speeds.append(vehicle.update(now).vx)
-        vehicle.press(0.1 if now < 50_000 else 0.0)
-    assert speeds[10] == 0 and speeds[15] > speeds[11] > 0
-    assert speeds[16] < speeds[15], "the pedal was let go at 50 ms and is at 150 ms"
 
 
 def test_a_reset_forgets_what_is_under_way() -> None:

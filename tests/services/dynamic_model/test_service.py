@@ -1,16 +1,13 @@
-import logging
 import math
 from pathlib import Path
 
 import pytest
 
 from dodo_dsl.opendlv.message_set import MessageSet
-from dodo_dsl.opendlv.session import Session
 from dodo_dsl.spec.manifest import load_manifest as load
 from services.base import Context, Output
 from services.base.flags import FlagsError, load_manifest, parse
 from services.dynamic_model.service import DynamicModel
-from tests.services.process import receive, running, send
 
 SECOND = 1_000_000
 STEERING, PEDAL = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"
@@ -41,28 +38,6 @@ def test_requests_move_the_body_that_its_output_tells() -> None:
     assert state.vx > 0.6 and state.yawRate > 0.1
 
 
-def test_what_is_no_number_is_said(caplog: pytest.LogCaptureFixture) -> None:
-    model, messages = service(), MessageSet.standard()
-    with caplog.at_level(logging.WARNING):
-        model.inputs[PEDAL, None](messages.type(PEDAL)(position=math.nan), 0)
-        model.inputs[STEERING, None](messages.type(STEERING)(groundSteering=math.inf), 0)
-    assert [record.getMessage() for record in caplog.records] == [
-        "ignored a PedalPositionRequest of nan",
-        "ignored a GroundSteeringRequest of inf",
-    ]
-
-
-def test_the_condition_of_the_flags() -> None:
-    model = service(**{"grip": 0.5, "power": 0.8, "steering-offset": 3.0, "latency": 0.05})
-    car = model.vehicle.car
-    assert (car.cornering_front, car.cornering_rear, car.gain_forward, car.gain_reverse) == (7.5, 7.5, 20.8, 4.0)
-    model.update(0)
-    model.inputs[PEDAL, None](MessageSet.standard().type(PEDAL)(position=0.1), 0)
-    for now in range(10_000, 1_000_001, 10_000):
-        model.update(now)
-    assert model.vehicle.motion.yaw_rate > 0.05
-
-
 def test_another_car(tmp_path: Path) -> None:
     (tmp_path / "car.yml").write_text("mass: 2\n")
     model = service(vehicle=str(tmp_path / "car.yml"), steps=4)  # deprecated
@@ -84,18 +59,6 @@ def test_the_command_reset_and_no_other() -> None:
     command(messages.type("opendlv.sim.Command")(command="reset"), 0)
     (output,) = model.update(2 * SECOND)
     assert (output.message.vx, output.message.vy, output.message.yawRate) == (0, 0, 0)
-
-
-def test_on_the_bus(cid: int, tmp_path: Path) -> None:
-    with Session(cid) as session, running("dynamic_model", tmp_path, f"--cid={cid}", "--frame-id=7"):
-        first, state = receive(session, "opendlv.sim.KinematicState", 7)
-        assert state.vx == 0
-        send(session, PEDAL, sender_stamp=42, position=-0.5)
-        while state.vx == 0:
-            envelope, state = receive(session, "opendlv.sim.KinematicState", 7)
-        assert state.vx < 0
-        assert envelope.sample_time > first.sample_time
-        assert (envelope.sample_time - first.sample_time) % 10_000 == 0
 
 
 STEER, SPEED, ACCELERATE, PEDALS, AXLES = (

@@ -23,7 +23,6 @@ from services.inertial_sensor.model import (
 )
 from services.integrator.model import BodyPose, Integrator, Twist, angles
 
-SECOND = 1_000_000
 G = 9.81
 
 
@@ -54,24 +53,6 @@ def test_on_a_circle_it_reads_the_acceleration_to_the_centre(lever: Vector) -> N
         force = model.force(upright(rate * number / 100))
         assert force == pytest.approx((-(rate**2) * lever[0], speed * rate - rate**2 * lever[1], G))
     assert model.rates == (0.0, 0.0, rate)
-
-
-def test_on_a_straight_it_reads_what_the_speed_gains_and_holds_it_between_states() -> None:
-    model = InertialModel((0.5, 0.1, 0.2), gravity=0.0)
-    for number in range(5):
-        model.feed(BodyState(number * 10_000, (0.03 * number, 0.0, 0.0)))
-        forces = [model.force(UPRIGHT) for _ in range(2)]
-        assert forces == [pytest.approx((3.0 if number else 0.0, 0.0, 0.0))] * 2
-    model.feed(BodyState(20_000, (9.0, 9.0, 9.0)))  # late
-    assert model.force(UPRIGHT) == pytest.approx((3.0, 0.0, 0.0))
-
-
-def test_beginning_to_turn_pushes_a_sensor_before_the_centre_sideways() -> None:
-    model = InertialModel((0.5, 0.0, 0.0), gravity=0.0)
-    for number in range(3):
-        model.feed(BodyState(number * 10_000, rates=(0.0, 0.0, 0.02 * number)))
-        model.force(UPRIGHT)
-    assert model.force(UPRIGHT) == pytest.approx((-0.5 * 0.03**2, 0.5 * 2.0, 0.0))
 
 
 def test_the_readings_are_the_derivative_of_a_drive() -> None:

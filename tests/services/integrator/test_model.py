@@ -40,30 +40,6 @@ def test_a_circle_is_exact_whatever_the_step(period: int) -> None:
     assert math.remainder(heading(pose) - angle, math.tau) == pytest.approx(0, abs=1e-9)
 
 
-def test_a_plane_motion_stays_in_the_plane_exactly() -> None:
-    body = Integrator(BodyPose((0.0, 0.0, 0.25), quaternion(0, 0, 1)))
-    body.update(0)
-    body.feed(CIRCLE, 0)
-    for now in range(0, SECOND, 10_000):
-        pose = body.update(now)
-        assert (pose.position[2], pose.attitude[0], pose.attitude[1]) == (0.25, 0.0, 0.0)
-
-
-def test_forward_goes_where_the_body_looks() -> None:
-    body = Integrator(start(yaw=math.pi / 2))
-    body.update(0)
-    body.feed(Twist((2.0, 0.0, 0.0)), 0)
-    assert body.update(SECOND).position == pytest.approx((0, 2, 0))
-
-
-def test_a_climb_follows_the_pitch_rate() -> None:
-    body = Integrator(start())
-    body.update(0)
-    body.feed(Twist((1.0, 0.0, 0.0), (0.0, -math.pi / 2, 0.0)), 0)
-    radius = 2 / math.pi
-    assert body.update(SECOND).position == pytest.approx((radius, 0, radius))
-
-
 def test_the_first_update_advances_nothing_and_time_does_not_run_backwards() -> None:
     body = Integrator(start(3, 4))
     body.feed(CIRCLE, 0)
@@ -120,15 +96,3 @@ def test_reset_goes_back_to_the_start_and_stands() -> None:
     assert body.update(3 * SECOND) == start(1, 2, 0.7)
     body.feed(CIRCLE, 3 * SECOND)
     assert body.update(4 * SECOND).position[:2] == pytest.approx(on_the_circle(start(1, 2), 0.7, 1.0)[:2])
-
-
-def test_an_hour_of_circles_drifts_by_nothing_that_shows() -> None:
-    body = Integrator(start())
-    body.update(0)
-    body.feed(CIRCLE, 0)
-    for now in range(0, 3600 * SECOND, 100_000):
-        body.update(now)
-    x, y, angle = on_the_circle(start(), 0.0, 3600.0)
-    pose = body.update(3600 * SECOND)
-    assert pose.position == pytest.approx((x, y, 0.0), abs=1e-9)
-    assert math.remainder(heading(pose) - angle, math.tau) == pytest.approx(0, abs=1e-9)

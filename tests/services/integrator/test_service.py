@@ -9,10 +9,8 @@ from dodo_dsl.opendlv import odvd
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
-from dodo_dsl.opendlv.session import Session
 from services.base import Context, Flags, Output
 from services.integrator.service import OLD_FRAME, Integration
-from tests.services.process import receive, running, send
 
 STATE = "opendlv.sim.KinematicState"
 START = {"freq": 100.0, "x": 1, "y": 2.0, "z": 0.5, "roll": 0, "pitch": 0, "yaw": 90.0, "frame-id": 4}
@@ -70,28 +68,6 @@ def test_the_command_reset_and_no_other() -> None:
         (output,) = body.update(1_000_000)
         assert isinstance(output, Output)
         assert output.message.y == pytest.approx(y)
-
-
-@pytest.mark.parametrize("own", [[], [OLD_FRAME]])
-def test_on_the_bus(cid: int, own: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("DODO_ODVD", ":".join(map(str, own)))
-    flags = (f"--cid={cid}", "--frame-id=4", "--x=1", "--yaw=180")
-    with Session(cid) as session, running("integrator", tmp_path, *flags):
-        _, frame = receive(session, "opendlv.sim.Frame", 4)
-        assert [frame.x, frame.y] == [1, 0]
-        send(session, STATE, sender_stamp=5, vy=100.0)
-        send(session, STATE, sender_stamp=4, vx=100.0)
-        while frame.x == 1:
-            _, frame = receive(session, "opendlv.sim.Frame", 4)
-        assert frame.x < 1 and frame.y == pytest.approx(0, abs=1e-3)
-
-
-def test_frames_of_set_09_on_the_bus(cid: int, tmp_path: Path) -> None:
-    with Session(cid) as session, running("integrator", tmp_path, f"--cid={cid}", "--euler", "--yaw=90"):
-        while (envelope := session.receive(20)) is not None and envelope.data_type != 1001:
-            pass
-        assert envelope is not None
-        assert MessageSet(odvd.load(OLD_FRAME)).decode(1001, envelope.payload).yaw == pytest.approx(math.pi / 2)
 
 
 def test_real_frames_of_set_09_have_this_layout(shared_data: Callable[[str], Path]) -> None:

@@ -30,11 +30,6 @@ def test_overlaps_are_those_of_pycocotools_and_shapely(found: list[Box], true: l
             assert scores[row, column] == pytest.approx(expected, abs=1e-9)
 
 
-def test_known_overlaps() -> None:
-    true = [UNIT, Box(0.5, 0, 1, 1), Box(1, 0, 1, 1), Box(0.25, 0.25, 0.5, 0.5)]
-    assert overlaps([UNIT], true).tolist() == [[1.0, 1 / 3, 0.0, 0.25]]
-
-
 @pytest.mark.parametrize(
     "bad",
     [

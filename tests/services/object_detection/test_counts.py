@@ -36,12 +36,6 @@ def test_a_class_only_pairs_with_itself() -> None:
     assert dict(compare(found, true, 0.5, ["yellow", "blue"])).keys() == {"yellow", "blue"}
 
 
-def test_a_threshold_is_to_be_exceeded() -> None:
-    half = Box(0, 0, 0.1, 0.05)
-    assert compare([LabelledBox("a", half)], [LabelledBox("a", A)], 0.5, ()).total() == Counts(0, 1, 1)
-    assert compare([LabelledBox("a", half)], [LabelledBox("a", A)], 0.49, ()).total().hits == 1
-
-
 def test_parts_join_by_detection_id_whatever_their_order() -> None:
     detections = Detections()
     for number, value in (
@@ -68,14 +62,6 @@ def test_of_one_detection_the_first_word_counts() -> None:
     for value in (A, B, B, "yellow", "blue", TypeNumber(1), TypeNumber(2)):
         detections.add(0, value)
     assert (detections.labelled(), detections.repeated) == ([LabelledBox("yellow", A)], 2)
-
-
-def test_no_property_is_no_class() -> None:
-    detections = Detections()
-    assert not detections
-    detections.add(0, "")
-    detections.add(0, A)
-    assert detections and detections.labelled() == [LabelledBox("", A)]
 
 
 def coco_by_class(

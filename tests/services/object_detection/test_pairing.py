@@ -36,29 +36,6 @@ def test_pairs_are_the_best_of_all_ways_to_pair(table: Scores, threshold: float)
     assert (len(pairs), round(float(sum(table[pair] for pair in pairs)), 9)) == brute(table, threshold)
 
 
-def test_more_pairs_are_better_than_one_good_pair() -> None:
-    table = np.array([[0.95, 0.6], [0.6, 0.0]])
-    assert best_pairs(table, 0.5) == [(0, 1), (1, 0)]
-
-
-def test_a_score_equal_to_the_threshold_is_no_pair() -> None:
-    assert best_pairs(np.array([[0.5]]), 0.5) == []
-    assert best_pairs(np.array([[np.nextafter(0.5, 1)]]), 0.5) == [(0, 0)]
-
-
-def test_the_order_of_rows_does_not_matter() -> None:
-    table = np.random.default_rng(3).random((30, 40))
-    pairs = best_pairs(table, 0.3)
-    assert sorted((29 - row, column) for row, column in best_pairs(table[::-1], 0.3)) == pairs
-    assert sorted((row, column) for column, row in best_pairs(table.T, 0.3)) == pairs
-
-
-def test_a_flood_of_boxes() -> None:
-    rng = np.random.default_rng(1)
-    table = rng.random((2000, 12))
-    assert len(best_pairs(table, 0.5)) == 12
-
-
 def coco_counts(found: list[Box], true: list[Box], threshold: float) -> tuple[int, int, int]:
     """TP, FP and FN of pycocotools for one picture, a class and detections of one score."""
     dataset = COCO()

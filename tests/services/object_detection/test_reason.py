@@ -11,37 +11,6 @@ def score(hits: int, false: int, missed: int, **about: int) -> Score:
     return Score(CountsByClass({"yellow": Counts(hits, false, missed)}), **frames)  # type: ignore[arg-type]
 
 
-def test_a_pass_names_the_kept_limits() -> None:
-    passed = verdict(score(9, 1, 0), DetectionLimits(precision=0.9, f1=0.5), "")
-    assert (passed.outcome, passed.reason) == (
-        "passed",
-        "found 9 of 9 objects in 2 frames, with 1 false detection: precision 0.9 (at least 0.9), "
-        "f1 0.9474 (at least 0.5)",
-    )
-
-
-def test_a_value_just_under_its_limit_is_written_in_full() -> None:
-    failed = verdict(score(89999, 10001, 0), DetectionLimits(precision=0.9), "")
-    assert failed.reason == "precision is 0.89999 (at least 0.9), with 10001 false detections beside 89999 found"
-
-
-def test_what_was_left_out_is_named() -> None:
-    reason = verdict(score(1, 0, 0, without_truth=1, late=2, repeated=1), DetectionLimits(recall=0.1), "").reason
-    assert reason.endswith(
-        "; left out: 1 frame without ground truth, 2 detections too late, 1 detection under a detectionId "
-        "that was in use"
-    )
-
-
-def test_silence_is_explained() -> None:
-    nothing = DetectionLimits(recall=0.1)
-    assert verdict(Score(), nothing, "within 9.00 s").reason == "no detection came within 9.00 s"
-    assert verdict(Score(frames=1), nothing, "within 9.00 s").reason == "no detection came within 9.00 s, in 1 frame"
-    assert verdict(Score(without_truth=3), nothing, "").reason == (
-        "none of 3 frames with detections has ground truth: is their sample time that of the picture?"
-    )
-
-
 def test_a_measure_without_a_value_says_why() -> None:
     reason = verdict(score(0, 0, 0), DetectionLimits(precision=0.1, recall=0.1), "").reason
     assert reason == (

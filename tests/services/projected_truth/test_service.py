@@ -150,15 +150,6 @@ def test_a_camera_that_comes_later_is_found_and_one_that_goes_is_no_error(resour
         assert projection.update(BEGIN + 215_000)
 
 
-def test_a_reader_that_holds_the_lock_for_long_loses_no_picture(resources: ExitStack) -> None:
-    """So an application cannot keep the truth about it away."""
-    projection = Projection(resources, "--x=-0.7")
-    projection.picture(BEGIN)
-    with projection.memory.lock():
-        assert projection.update(BEGIN + 1_000) == []
-    assert projection.update(BEGIN + 6_000)
-
-
 class SteppedClock(RealTimeClock):
     """Of lockstep, as far as a service is built with it."""
 

@@ -10,7 +10,7 @@ from services.base.flags import FlagsError, load_manifest, parse
 from tests.services.built import built, hand, refusal
 from tests.services.process import ROOT
 
-FRAME, DISTANCE, VOLTAGE = "opendlv.sim.Frame", "opendlv.proxy.DistanceReading", "opendlv.proxy.VoltageReading"
+FRAME, VOLTAGE = "opendlv.sim.Frame", "opendlv.proxy.VoltageReading"
 WALL = {"obstacles": [{"name": "wall", "lines": [[2, -9, 2, 9]]}]}
 CAR = {"name": "car", "file": "cube.obj", "color": [1, 0, 0], "frames": [0, 1]}
 NORTH = {"qz": math.sin(math.pi / 4), "qw": math.cos(math.pi / 4)}
@@ -90,16 +90,3 @@ def test_items_of_lists_are_checked(flag: str) -> None:
             load_manifest(ROOT / "services/range_finder"),
             [f"--{n}={v}" for n, v in {"cid": "1", "map-path": "m", **words}.items()],
         )
-
-
-def test_readings_are_the_same_bit_by_bit() -> None:
-    def drive() -> list[tuple[int, bytes]]:
-        flags = ["--id=0,1", "--yaw=0,90", "--walls=left,right", "--noise=0.02", "--outliers=0.1", "--seed=4"]
-        sent = []
-        with built("range_finder", f"--map-path={ROOT / 'tests_registry/maps/kiwi-track'}", *flags) as service:
-            for step in range(20):
-                hand(service, FRAME, 0, 0, x=0.1 * step, **NORTH)
-                sent += [(o.sender_stamp, o.message.SerializeToString()) for o in service.update(0)]
-        return sent
-
-    assert drive() == drive() and len(set(drive())) > 20

@@ -102,23 +102,6 @@ def test_lossless_pictures_are_decoded_bit_for_bit(tmp_path: Path, kind: str) ->
         assert frame is not None and np.array_equal(frame.pixels(kind), scene(number, kind))
 
 
-def test_messages_are_as_opendlv_has_them(tmp_path: Path) -> None:
-    path = record(tmp_path, "i420", "--key-interval=3", "--quality=20", "--id=5")
-    decoder, messages = VideoDecoder("h264"), MESSAGES
-    envelopes = [e for e in read_envelopes(path) if e.data_type == IMAGE]
-    for number, envelope in enumerate(envelopes):
-        image = messages.decode(IMAGE, envelope.payload)
-        assert (image.format, image.width, image.height, image.sampleId) == ("h264", WIDTH, HEIGHT, number)
-        assert (b"\0\0\0\1\x67" in image.data) == (number % 3 == 0)
-        assert (envelope.sender_stamp, envelope.sample_time) == (5, T0 + number * PERIOD)
-        assert 0 < envelope.sent == envelope.received
-        frame = decoder.decode(image.data)
-        assert frame is not None
-        error = frame.pixels("i420").astype(float) - scene(number, "i420")
-        assert 10 * np.log10(255**2 / (error**2).mean()) > 36  # PSNR in dB
-    assert len(envelopes) == COUNT
-
-
 def test_commands_pause_pictures_and_messages(tmp_path: Path) -> None:
     path, command = tmp_path / "drive.rec", "cluon.data.RecorderCommand"
     with staged(path, "i420", "--paused") as stage:
@@ -202,13 +185,6 @@ def test_what_cannot_be_encoded_ends_only_the_pictures_that_decide_nothing(
     ]
     with staged(tmp_path / "two.rec", "i420", width=162) as stage, pytest.raises(SourceError):
         stage.show(0)
-
-
-def test_looks_are_as_few_as_pictures_need(tmp_path: Path) -> None:
-    with staged(tmp_path / "one.rec", "i420") as stage:
-        assert stage.recorder.period == 5000
-    with staged(tmp_path / "two.rec", "i420", f"--pictures={tmp_path / 'frames.rec'}") as stage:
-        assert stage.recorder.period == 12_500
 
 
 def test_a_recording_of_pictures_needs_their_rate(tmp_path: Path) -> None:

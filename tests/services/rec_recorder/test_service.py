@@ -35,16 +35,6 @@ def test_every_message_is_there_even_after_a_kill(cid: int, tmp_path: Path) -> N
     assert list(read_envelopes(path)) == recorded
 
 
-def test_what_came_before_the_end_is_there(cid: int, tmp_path: Path) -> None:
-    path = tmp_path / "drive.rec"
-    with Session(cid) as session, running("rec_recorder", tmp_path, f"--cid={cid}", f"--rec={path}") as recorder:
-        for number in range(300):
-            session.send_envelope(Envelope(4711, b"", number, 0, 0, 0))
-        recorder.terminate()
-        assert recorder.wait(PATIENCE) == 0
-    assert [e.sent for e in read_envelopes(path)] == list(range(300))
-
-
 def test_a_file_that_is_there_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "drive.rec"
     path.write_bytes(b"dear")

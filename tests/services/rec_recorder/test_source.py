@@ -72,13 +72,6 @@ def test_a_memory_that_comes_and_goes(memory: SharedMemory) -> None:
         assert source.take(start * 1_000_000 + 1) is None  # it is gone
 
 
-def test_it_never_stands_in_line(memory: SharedMemory) -> None:
-    source = PictureSource(MemorySpec(memory.name), PERIOD)
-    taken(source, memory, [1, 2])
-    assert memory.readers_waiting() == 0
-    source.close()
-
-
 @pytest.mark.parametrize(
     ("text", "size", "layout"),
     [

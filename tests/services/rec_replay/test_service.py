@@ -1,6 +1,4 @@
 import os
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,7 +11,7 @@ import pytest
 from dodo_dsl.opendlv import pixels
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
-from dodo_dsl.opendlv.recording import Recording, read_envelopes
+from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.video import VideoEncoder
 from services.base import Output
@@ -170,46 +168,6 @@ def test_pictures_with_their_sample_times(cid: int, tmp_path: Path) -> None:
     assert i420.seen == [(picture(n).tobytes(), T0 + round(t * S)) for n, t in enumerate(times)]
     assert [sampled for _, sampled in argb.seen] == [sampled for _, sampled in i420.seen]
     assert all(data[3::4] == b"\xff" * (len(data) // 4) for data, _ in argb.seen)
-
-
-def replayed_by_libcluon(cid: int, rec: Path) -> list[Envelope]:
-    program = Path(sys.executable).with_name("cluon-replay")
-    if not program.exists():
-        pytest.skip("cluon-replay is absent")
-    with Session(cid) as session:
-        sink = subprocess.DEVNULL
-        with subprocess.Popen([program, f"--cid={cid}", rec], stdout=sink, stderr=sink) as process:
-            heard, last = [], time.monotonic()
-            while (envelope := session.receive(0.3)) is not None or process.poll() is None:
-                if envelope is not None and envelope.data_type != STATUS:
-                    heard.append(envelope)
-                    last = time.monotonic()
-                elif time.monotonic() > last + PATIENCE:
-                    process.kill()  # it has played all or hangs, which the messages tell
-    return heard
-
-
-def replayed_by_us(cid: int, rec: Path, folder: Path) -> list[Envelope]:
-    with Session(cid) as session, running("rec_replay", folder, f"--cid={cid}", f"--rec={rec}", "--settle=0"):
-        send(session, "dodo.TestBegin")
-        return until_end(session)
-
-
-def shortened(rec: Path, count: int, target: Path) -> Path:
-    """The first messages, so that a test does not last as long as a drive."""
-    rows = list(read_envelopes(rec))[:count]
-    return write(target, rows)
-
-
-@pytest.mark.realtime
-@pytest.mark.parametrize(("name", "count"), [("sim-2023-04-27.rec", 150), ("cones-2020-05-15.rec", 10)])
-def test_the_bus_has_what_cluon_replay_sends(
-    cid: int, tmp_path: Path, shared_data: Callable[[str], Path], name: str, count: int
-) -> None:
-    rec = shortened(shared_data(name), count, tmp_path / name)
-    theirs, ours = replayed_by_libcluon(cid, rec), replayed_by_us(cid, rec, tmp_path)
-    assert [key(e) for e in ours] == [key(e) for e in theirs]
-    assert len(ours) == count
 
 
 @pytest.mark.realtime

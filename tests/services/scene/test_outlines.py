@@ -129,10 +129,3 @@ def test_what_has_no_length_is_not_there():
     look = (np.zeros((1, 2)), np.array([[1.0, 0.0]]))
     assert (len(cut.first), len(cut.starts)) == (1, 1)
     assert cut.distances(*look, 6.0).tolist() == cut.nearest(*look, 0.4, 6.0).tolist() == [2.0]
-
-
-def test_no_ray_slips_through_a_corner(write_map):
-    block = {"name": "b", "dimension": [1, 1, 1], "color": [1, 0, 0], "instances": [[2, 0, 0.5, math.pi / 4]]}
-    cut = Outlines(write_map({"block": [block]})).at(0.5)
-    found = cut.distances(np.zeros((1, 2)), np.array([[1.0, 0.0]]), 6.0)
-    assert found[0] == pytest.approx(2 - math.sqrt(0.5))

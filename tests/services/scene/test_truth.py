@@ -68,14 +68,6 @@ def test_a_model_that_is_seen_has_a_box_around_its_pixels(straight, x, y, z, yaw
         assert 0 < box.visible <= 1
 
 
-def test_labels_show_what_the_picture_shows(cube_at):
-    renderer = Renderer(load_scene(cube_at([3, 0.2, 0, 0.3], [5, -1, 0, 1], [2, 2, 0, 0])), 160, 120, 1.0)
-    pose = CameraPose.at(0, 0, 0.8, pitch=0.1)
-    image, (labels, _) = renderer.render(pose), renderer.labels(pose)
-    red = (image[..., 2] > 100) & (image[..., 0] < 50)
-    assert ((labels >= 0) == red).all()
-
-
 def test_what_hides_a_model_takes_from_its_visible_share(cube_at):
     """Two cubes one behind the other; the nearer is smaller in height but as wide as the other's left half."""
     apart = boxes(cube_at([4, 0, 0, 0], [9, 3, 0, 0]), CameraPose.at(0, 0, 0.5))

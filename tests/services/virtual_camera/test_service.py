@@ -13,7 +13,6 @@ import pytest
 
 from dodo_dsl import package_data
 from dodo_dsl.opendlv.message_set import MessageSet
-from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.base import Context, Output
 from services.base.flags import load_manifest, parse
@@ -21,12 +20,10 @@ from services.scene.camera import CameraPose
 from services.scene.render import Renderer
 from services.scene.scene import load_scene
 from services.virtual_camera.service import build
-from tests.services.process import receive, running
 
 MANIFEST = load_manifest(package_data.services() / "virtual_camera")
 STRAIGHT = package_data.registry() / "maps" / "straight"
 MESSAGES = MessageSet.standard()
-LOGIC = "opendlv.logic.perception.Detection"
 PLACE = ["--z=0.095", "--yaw=90"]
 START, STEP = 1_700_000_000_000_000, 50_000
 NUMBERS = count()
@@ -225,29 +222,6 @@ def test_true_boxes_follow_as_three_messages_each(camera):
     assert min(map(len, sides.values())) > 3
 
 
-@pytest.mark.thorough
-def test_limits_leave_out_what_is_too_little(camera):
-    frame = (0.0, 0.0, 0.0)
-
-    def count_of(*flags: str) -> int:
-        made = camera("--truth-sender=9", *flags, size=(640, 480))
-        return len(told(made.shoot(frame).outputs))
-
-    everything = count_of("--truth-min-visible=0", "--truth-min-height=0")
-    assert count_of("--truth-min-visible=1", "--truth-min-height=0") < everything
-    assert 0 < count_of("--truth-min-visible=0", "--truth-min-height=20") < everything
-    assert count_of("--truth-classes=cone_red", "--truth-min-visible=0", "--truth-min-height=0") == 2
-
-
-def test_a_model_keeps_its_number_from_picture_to_picture(camera):
-    made = camera("--truth-sender=9", size=(640, 480))
-    one, two = (told(made.shoot((0.0, y, 0.0)).outputs) for y in (0.0, 0.02))
-    assert len(one.keys() & two.keys()) > 8
-    for number in one.keys() & two.keys():
-        first, second = (said[number]["DetectionBoundingBox"] for said in (one, two))
-        assert (first.x + first.width / 2, first.y) == pytest.approx((second.x + second.width / 2, second.y), abs=0.05)
-
-
 @pytest.mark.parametrize(
     ("flag", "message"),
     [
@@ -259,19 +233,3 @@ def test_a_model_keeps_its_number_from_picture_to_picture(camera):
 def test_what_cannot_be_is_told(camera, flag, message):
     with pytest.raises(ValueError, match=message):
         camera("--truth-sender=9", flag)
-
-
-@pytest.mark.slow
-def test_boxes_on_the_bus_bear_the_time_of_the_picture_in_memory(tmp_path, cid):
-    names = [f"--name.{kind}=dodo-test-{os.getpid()}-{cid}.{kind}" for kind in ("argb", "i420")]
-    flags = [f"--cid={cid}", f"--map-path={STRAIGHT}", *PLACE, *names, "--start-y=0", "--truth-sender=9", "--freq=20"]
-    with Session(cid, MESSAGES) as session, running("virtual_camera", tmp_path, *flags):
-        with SharedMemory.attach(names[0].partition("=")[2]) as memory:
-            assert memory.wait(10)
-            with memory.lock():
-                pictured = memory.sample_time()
-        sampled = [receive(session, f"{LOGIC}BoundingBox", 9)[0].sample_time]
-        while sampled[-1] <= pictured + 50_000:
-            sampled.append(receive(session, f"{LOGIC}BoundingBox", 9)[0].sample_time)
-    assert pictured in sampled
-    assert not (np.diff(sampled) % 50_000).any()

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from dodo_dsl.opendlv.assets.problem import InputError
 from services.scene.camera import CameraPose, Pinhole, View
 from services.scene.surfaces import Face, TextureMap, draw_backdrop, patches
-from services.scene.textures import Texture, default_ground, load_picture
+from services.scene.textures import Texture, load_picture
 
 SKY, GROUND = (255.0, 0.0, 0.0, 255.0), (0.0, 255.0, 0.0, 255.0)
 
@@ -91,18 +91,6 @@ def test_a_floor_seen_from_below_or_along_is_not_drawn():
     assert not image.any()
 
 
-def test_a_tile_that_does_not_fit_the_canvas_is_wrapped():
-    texture, tile = Texture(waves(64), 0), 0.5
-    lie = TextureMap(texture, np.array([0.3, 0.1, 0.0]), np.array([tile, 0, 0]), np.array([0, tile, 0.0]))
-    small = Face(floor(4.0, tile, 64).points, np.array([0.0, 0.0, 1.0]), 0.0, lie)
-    images = np.zeros((2, 48, 64, 4), np.uint8)
-    view = Pinhole(64, 48, 1.0).view(CameraPose.at(0, 0, 3, pitch=1.0))
-    for image, face in zip(images, (small, floor(4.0, tile, 64)), strict=True):
-        draw_face(image, view, face)
-    assert images[0].any()
-    assert np.abs(images[0].astype(int) - images[1]).max() <= 1
-
-
 @pytest.mark.parametrize("height", [480, 481])
 def test_the_horizon_is_in_the_middle_of_a_level_picture(height):
     image = np.zeros((height, 64, 4), np.uint8)
@@ -121,23 +109,11 @@ def test_a_roll_tilts_and_a_pitch_moves_the_horizon():
     assert rows == pytest.approx([150, 50], abs=1)  # the right side of the camera is low: the ground is there
 
 
-def test_looking_straight_up_there_is_only_sky():
-    image = np.zeros((20, 20, 4), np.uint8)
-    draw_backdrop(image, Pinhole(20, 20, 1.0).view(CameraPose.at(0, 0, 1, pitch=-math.pi / 2)), SKY, GROUND)
-    assert (image == SKY).all()
-
-
 def test_large_pictures_are_made_smaller_and_odd_ones_keep_their_proportions():
     texture = Texture(np.full((3000, 1500, 3), 77, np.uint8), 1)
     assert texture.tiles[0].shape == (750, 375, 4)
     assert all((tile == (77, 77, 77, 255)).all() for tile in texture.tiles)
     assert texture.mean == (77.0, 77.0, 77.0)
-
-
-def test_the_default_ground_has_structure_but_is_grey():
-    ground = default_ground()
-    assert ground.std() > 5
-    assert np.ptp(ground, axis=-1).max() == 0
 
 
 def test_what_is_no_picture_is_told(tmp_path):

@@ -29,8 +29,3 @@ def test_the_seed_alone_decides_the_clutter():
 
     assert np.array_equal(drawn(3), drawn(3))
     assert not np.array_equal(drawn(3), drawn(4))
-
-
-def test_clutter_of_a_map_without_models_surrounds_the_origin():
-    places = np.concatenate([copies.positions for copies in clutter(20, 1, ())])
-    assert np.abs(places).max() <= FARTHEST
