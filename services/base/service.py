@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Self
 
 from google.protobuf.message import Message
 
@@ -37,6 +37,33 @@ class Check:
     exclusive: bool = False
     parameters: tuple[str, ...] = field(default=(), compare=False)
 
+    @classmethod
+    def most(
+        cls, name: str, value: float | None, limit: float | None, unit: str = "", parameters: tuple[str, ...] = ()
+    ) -> Self:
+        """One that keeps ``limit`` up to it, None for no limit; no value does not keep it."""
+        ok = limit is None or (value is not None and value <= limit)
+        return cls(name, value, {} if limit is None else {"max": limit}, unit, ok, parameters=parameters)
+
+    @classmethod
+    def least(
+        cls, name: str, value: float | None, limit: float | None, unit: str = "", parameters: tuple[str, ...] = ()
+    ) -> Self:
+        """One that keeps ``limit`` from it on, None for no limit; no value does not keep it."""
+        ok = limit is None or (value is not None and value >= limit)
+        return cls(name, value, {} if limit is None else {"min": limit}, unit, ok, parameters=parameters)
+
+    @property
+    def bound(self) -> str:
+        """Its limit in a sentence: ``at most 0.5``; empty without one."""
+        return "".join(f"at {'most' if side == 'max' else 'least'} {said(at)}" for side, at in self.limit.items())
+
+    @property
+    def told(self) -> str:
+        """The value in a sentence, in full where rounding would hide that it broke its limit."""
+        short = said(self.value)
+        return str(self.value) if not self.ok and short in map(said, self.limit.values()) else short
+
     def as_json(self) -> dict[str, Any]:
         """The check in the verdict line; numbers may come from numpy."""
         return {
@@ -47,6 +74,11 @@ class Check:
             "ok": bool(self.ok),
             **({"exclusive": True} if self.exclusive else {}),
         }
+
+
+def said(value: float | None) -> str:
+    """A number in a sentence."""
+    return "nothing" if value is None else str(value) if isinstance(value, int) else f"{value:z.4g}"
 
 
 SINGLE = 2.0**-24

@@ -56,22 +56,19 @@ class DriveMeasures:
 
     def checks(self, track: Track, crossed: int, rest: float | None, has_bodies: bool) -> Iterator[Check]:
         """Those of a track; the ``rest`` in m to the goal decides nothing, but shows how far a drive came."""
-        arrived, gates, fast = self.time_to_goal, len(track.gates), track.max_speed
+        arrived, gates = self.time_to_goal, len(track.gates)
         if track.goal or gates:
-            limit = {"max": track.max_time}
-            yield Check("time-to-goal", arrived, limit, "s", arrived is not None, parameters=("max-time", "goal"))
+            yield Check.most("time-to-goal", arrived, track.max_time, "s", ("max-time", "goal"))
             if rest is not None:
-                yield Check("to-goal", rest, {"max": 0.0}, "m", rest <= 0.0, parameters=("goal", "gates"))
+                yield Check.most("to-goal", rest, 0.0, "m", ("goal", "gates"))
         if gates:
-            yield Check("gates", crossed, {"min": gates}, "", crossed == gates)
+            yield Check.least("gates", crossed, gates)
         if track.walls:
             yield _margin_check("wall-margin", self.wall_margin, track.min_margin, ("min-margin", "walls"))
         if has_bodies:
             yield _margin_check("body-margin", self.body_margin, track.min_body_margin, ("min-body-margin", "bodies"))
-        least = {"min": track.min_distance} if track.min_distance else {}
-        yield Check("distance", self.distance, least, "m", self.distance >= track.min_distance)
-        is_kept = fast is None or (self.max_speed is not None and self.max_speed <= fast)
-        yield Check("max-speed", self.max_speed, {} if fast is None else {"max": fast}, "m/s", is_kept)
+        yield Check.least("distance", self.distance, track.min_distance or None, "m")
+        yield Check.most("max-speed", self.max_speed, track.max_speed, "m/s")
 
 
 def _margin_check(name: str, margin: float | None, limit: float, flags: tuple[str, ...]) -> Check:
@@ -137,8 +134,7 @@ class Requests:
         if math.isinf(self._max_silence):
             return ()
         longest = self._longest / MICROSECONDS if self.came else None
-        is_kept = longest is not None and longest <= self._max_silence
-        return (Check("silence", longest, {"max": self._max_silence}, "s", is_kept),)
+        return (Check.most("silence", longest, self._max_silence, "s"),)
 
 
 PERIOD = 10_000  # us

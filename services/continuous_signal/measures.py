@@ -6,7 +6,6 @@ target, and how long it stays the same.
 """
 
 from array import array
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -228,23 +227,23 @@ class SignalMeasures:
         shares += [(*each, limit) for each, limit in zip(by_frames, wanted, strict=True) if limit is not None]
         held, gap = (self.coverage.share, self.coverage.gap) if self.coverage else (None, None)
         longest = None if limits.gap is None else limits.gap / MICROSECONDS
-        lag = () if limits.lag is None else (_check("lag", self.lag, "max", limits.lag, "s"),)
+        lag = () if limits.lag is None else (Check.most("lag", self.lag, limits.lag, "s"),)
         run = self.repeats.samples if self.repeats else None
-        repeats = () if limits.repeats is None else (_check("repeats", run, "max", limits.repeats),)
+        repeats = () if limits.repeats is None else (Check.most("repeats", run, limits.repeats),)
         return (
-            _check("mean", self.mean, "max", limits.mean),
-            _check("std", self.std, "max", limits.std),
-            _check("distance", self.distance, "max", limits.distance),
-            _check("mean-over-time", self.mean_over_time, "max", limits.mean, parameters=("max-mean",)),
-            _check("std-over-time", self.std_over_time, "max", limits.std, parameters=("max-std",)),
-            *(_check(name, value, "min", limit) for name, value, limit in shares),
+            Check.most("mean", self.mean, limits.mean),
+            Check.most("std", self.std, limits.std),
+            Check.most("distance", self.distance, limits.distance),
+            Check.most("mean-over-time", self.mean_over_time, limits.mean, parameters=("max-mean",)),
+            Check.most("std-over-time", self.std_over_time, limits.std, parameters=("max-std",)),
+            *(Check.least(name, value, limit) for name, value, limit in shares),
             *lag,
             *repeats,
-            _check("samples", self.samples, "min", limits.samples),
-            _check("gap", gap, "max", longest, "s"),
-            _check("coverage", held, "min", limits.coverage),
+            Check.least("samples", self.samples, limits.samples),
+            Check.most("gap", gap, longest, "s"),
+            Check.least("coverage", held, limits.coverage),
             Check("outside", self.outside),
-            _check("broken", len(self.broken), "max", 0),
+            Check.most("broken", len(self.broken), 0),
         )
 
     def evidence(self) -> dict[str, float | str | None]:
@@ -363,21 +362,6 @@ def _average(values: NDArray[Any], weights: Values) -> float:
 def _coverage(times: Times, begin: int, end: int, hold: int, hidden: Hidden | None) -> Coverage | None:
     is_seen = begin < end if not hidden else hidden.shown(begin) < hidden.shown(end)
     return cover(times[(times >= begin) & (times <= end)], begin, end, hold, hidden) if is_seen else None
-
-
-def _check(
-    name: str,
-    value: float | None,
-    side: str,
-    limit: float | None,
-    unit: str = "",
-    parameters: tuple[str, ...] = (),
-) -> Check:
-    if limit is None:
-        return Check(name, value, {}, unit)
-    ok = value is not None and (value <= limit if side == "max" else value >= limit)
-    bounds: Mapping[str, float] = {side: limit}
-    return Check(name, value, bounds, unit, ok, parameters=parameters)
 
 
 class Arrival(NamedTuple):

@@ -11,6 +11,7 @@ from dodo_dsl.opendlv.envelope import MICROSECONDS
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.base.evaluator import EARLY, Hidden
 from services.base.judged import FAILED, MOST_SAMPLES, WARNED
+from services.base.service import said
 from services.continuous_signal.measures import (
     DAY,
     Coverage,
@@ -49,7 +50,7 @@ def verdict(
         aside = _late(late) if measures.samples and late.samples else ""
         likeness = f"; the signal is {measures.likeness}" if measures.likeness and "repeats" not in broken else ""
         return Verdict("failed", "; ".join(faults) + likeness + _worst(measures) + aside, checks, silent=silent)
-    kept = [f"{check.name} {_number(check.value)} ({_bound(check)})" for check in checks if _is_kept(check)]
+    kept = [f"{check.name} {check.told} ({check.bound})" for check in checks if _is_kept(check)]
     samples = f"{signal} kept to its target over {measures.samples} samples"
     aside = _late(late) if late.samples else ""
     return Verdict("passed", f"{samples}: {', '.join(kept)}{_worst(measures)}{aside}", checks)
@@ -71,7 +72,7 @@ def _nothing(signal: str, target: Target, measures: SignalMeasures, during: str,
 
 
 def _fault(check: Check, measures: SignalMeasures, limits: SignalLimits) -> str:
-    value, bound = _value(check), _bound(check)
+    value, bound = check.told, check.bound
     if check.name == "samples":
         aside = f", and {measures.outside} outside the target's time" if measures.outside else ""
         return f"only {value} samples came ({bound}){aside}"
@@ -80,9 +81,7 @@ def _fault(check: Check, measures: SignalMeasures, limits: SignalLimits) -> str:
     if check.name == "lag":
         return f"it lags its target by {value} s ({bound} s)"
     if check.name == "repeats":
-        which = (
-            f", {_number(measures.repeats.value)}, from {measures.repeats.time:.2f} s on" if measures.repeats else ""
-        )
+        which = f", {said(measures.repeats.value)}, from {measures.repeats.time:.2f} s on" if measures.repeats else ""
         return f"{value} samples in a row have the same value{which} ({bound})"
     if check.name == "share":
         return f"the share of time within {_width(limits)} of the target is {value} ({bound})"
@@ -99,19 +98,19 @@ def _fault(check: Check, measures: SignalMeasures, limits: SignalLimits) -> str:
 
 def _width(limits: SignalLimits) -> str:
     if limits.band is None or not limits.relative:
-        return _number(limits.band)
-    return f"{limits.band * 100:.4g} %" + (f" or {_number(limits.floor)}" if limits.floor else "")
+        return said(limits.band)
+    return f"{limits.band * 100:.4g} %" + (f" or {said(limits.floor)}" if limits.floor else "")
 
 
 def _hole(check: Check, coverage: Coverage | None) -> str:
     """What was left open, and how long that may be."""
-    bound = _bound(check)
+    bound = check.bound
     if coverage is None:
         return f"{check.name} has no value ({bound})"
     if check.name == "gap":
         return f"nothing came between {coverage.gap_begin:.2f} s and {coverage.gap_end:.2f} s ({bound} s)"
     judged = f"the time from {coverage.begin:.2f} s to {coverage.end:.2f} s"
-    return f"the samples cover {_value(check)} of {judged} ({bound})"
+    return f"the samples cover {check.told} of {judged} ({bound})"
 
 
 def _late(late: LateFacts, begin: str = "; left out: ") -> str:
@@ -124,30 +123,15 @@ def _late(late: LateFacts, begin: str = "; left out: ") -> str:
     return f"{begin}{count} whose time is not that of the arrival, the first of {late.time:.2f} s, {where}"
 
 
-def _value(check: Check) -> str:
-    """In full where rounding would hide that it broke its limit."""
-    short = _number(check.value)
-    return str(check.value) if short in map(_number, check.limit.values()) else short
-
-
 def _worst(measures: SignalMeasures) -> str:
     worst = measures.worst
     if worst is None:
         return ""
-    return f"; worst at {worst.time:.2f} s: {_number(worst.value)} with a target of {_number(worst.target)}"
-
-
-def _bound(check: Check) -> str:
-    side, limit = next(iter(check.limit.items()))
-    return f"at {'most' if side == 'max' else 'least'} {_number(limit)}"
+    return f"; worst at {worst.time:.2f} s: {said(worst.value)} with a target of {said(worst.target)}"
 
 
 def _times(count: int) -> str:
     return "its one sample" if count == 1 else f"{count} samples"
-
-
-def _number(value: float | None) -> str:
-    return "nothing" if value is None else str(value) if isinstance(value, int) else f"{value:z.4g}"
 
 
 MOST_IN_MEMORY = 10_000_000
@@ -246,7 +230,7 @@ class SignalEvaluator(Evaluator):
         """What a verdict by other limits does not show: a signal that sees nothing, or is late."""
         run, lag, delays = measures.repeats, measures.lag, self._late.delays
         if run and 1 < run.samples == measures.samples:
-            yield f"all {run.samples} samples of {self._signal} have the same value, {_number(run.value)}"
+            yield f"all {run.samples} samples of {self._signal} have the same value, {said(run.value)}"
         if lag and self._limits.lag is None:
             yield f"{self._signal} follows its target {lag:.2f} s late, and no max-lag is set"
         if delays and (delay := float(np.median(delays))) > EARLY:

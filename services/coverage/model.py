@@ -154,8 +154,8 @@ class CoverageEvaluator(Evaluator):
         """The share covered, the time to as much as is asked for, and the distance driven in m."""
         covered, reached = self._grid.share, self._reached
         return (
-            Check("covered", covered, {"min": self._least}, "", covered >= self._least, parameters=("min-share",)),
-            Check("time-to-cover", reached, {"max": self._limit}, "s", reached is not None, parameters=("max-time",)),
+            Check.least("covered", covered, self._least, parameters=("min-share",)),
+            Check.most("time-to-cover", reached, self._limit, "s", ("max-time",)),
             Check("distance", self._distance, {}, "m"),
         )
 

@@ -35,9 +35,7 @@ def verdict(score: Score, limits: DetectionLimits, during: str) -> Verdict:
         faults = [_fault(check, score) for check in _telling(broken, [label for label, _ in score.counts])]
         return Verdict("failed", "; ".join(faults) + _kinds(score) + _worst(score) + _aside(score), checks)
     total = score.counts.total()
-    kept = ", ".join(
-        f"{check.name} {_number(check)} ({_bound(check)})" for check in checks[: len(MEASURES)] if check.limit
-    )
+    kept = ", ".join(f"{check.name} {check.told} ({check.bound})" for check in checks[: len(MEASURES)] if check.limit)
     found = f"found {total.hits} of {total.hits + total.missed} objects in {_count(score.frames, 'frame')}"
     return Verdict("passed", f"{found}, with {_count(total.false, 'false detection')}: {kept}{_aside(score)}", checks)
 
@@ -64,7 +62,7 @@ def _silence(score: Score, during: str) -> str:
 
 
 def _fault(check: Check, score: Score) -> str:
-    bound = _bound(check)
+    bound = check.bound
     if check.name == "answered":
         if score.frames > score.answered:
             return f"answered {score.answered} of {_count(score.frames, 'frame')} ({bound})"
@@ -80,13 +78,13 @@ def _fault(check: Check, score: Score) -> str:
     counts = {class_name(each): of for each, of in score.counts}[label] if label else score.counts.total()
     wrong = {"precision": _count(counts.false, "false detection"), "recall": f"{counts.missed} missed"}
     both = f"{wrong['precision']} and {wrong['recall']}"
-    return f"{name} is {_number(check)} ({bound}), with {wrong.get(measure, both)} beside {counts.hits} found"
+    return f"{name} is {check.told} ({bound}), with {wrong.get(measure, both)} beside {counts.hits} found"
 
 
 def _unanswered(check: Check, score: Score) -> str:
     """How many, and where the longest run is."""
     count, frames, longest = score.unanswered.silent, score.unanswered.frames, score.unanswered.longest
-    said = f"{count} of {_count(frames, 'frame')} had no answer, a share of {_number(check)} ({_bound(check)})"
+    said = f"{count} of {_count(frames, 'frame')} had no answer, a share of {check.told} ({check.bound})"
     first, last = (frame.place.partition(" ")[2] for frame in (longest[0], longest[-1]))
     if len(longest) == 1:
         return f"{said}, such as the one {longest[0].place}"
@@ -120,18 +118,6 @@ def _aside(score: Score) -> str:
     ]
     left_out = ", ".join(note for note in notes if note)
     return f"; left out: {left_out}" if left_out else ""
-
-
-def _bound(check: Check) -> str:
-    side, limit = next(iter(check.limit.items()))
-    return f"at {'most' if side == 'max' else 'least'} {limit:.4g}"
-
-
-def _number(check: Check) -> str:
-    """In full where rounding would hide that it broke its limit."""
-    short = f"{check.value:.4g}"
-    bound = f"{next(iter(check.limit.values())):.4g}"
-    return str(check.value) if not check.ok and short == bound else short
 
 
 def _count(count: int, what: str) -> str:

@@ -7,7 +7,7 @@ for how long it said nothing.
 import json
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise
 from types import MappingProxyType
 from typing import NamedTuple
@@ -363,13 +363,14 @@ class Score:
             "mean-iou": total.mean_overlap,
             "frames": self.frames,
         }
+        silent = Check.most("unanswered", self.unanswered.share, limits.unanswered)
         left_out = {"without-truth": self.without_truth, "late": self.late, "repeated": self.repeated}
         return (
-            *(_check(name, getattr(total, name), limits.of(name)) for name in MEASURES),
+            *(Check.least(name, getattr(total, name), limits.of(name)) for name in MEASURES),
             *(Check(name, value) for name, value in counts.items()),
-            _check("answered", self.answered, limits.frames, ("min-frames",)),
-            _at_most("unanswered", self.unanswered.share, limits.unanswered),
-            _at_most("gap", self.gap.length if self.gap else None, limits.gap, "s"),
+            Check.least("answered", self.answered, limits.frames, parameters=("min-frames",)),
+            silent if self.unanswered.frames else replace(silent, ok=True),  # no answer was expected
+            Check.most("gap", self.gap.length if self.gap else 0.0, limits.gap, "s"),
             *(Check(name, value) for name, value in left_out.items()),
             *self._classes(limits),
         )
@@ -384,22 +385,11 @@ class Score:
                     continue
             for name in MEASURES:
                 limit = limits.of(name) if limits.each_class else None
-                yield _check(f"{name}-{class_name(label)}", getattr(counts, name), limit, (f"min-{name}",))
+                yield Check.least(
+                    f"{name}-{class_name(label)}", getattr(counts, name), limit, parameters=(f"min-{name}",)
+                )
 
 
 def class_name(label: str) -> str:
     """A class in names of checks, of at most ``MOST_NAME`` characters: an application's labels may be of any length."""
     return (label if len(label) <= MOST_NAME else label[: MOST_NAME - 1] + "…") or "unnamed"
-
-
-def _check(name: str, value: float | None, least: float | None, parameters: tuple[str, ...] = ()) -> Check:
-    if least is None:
-        return Check(name, value)
-    return Check(name, value, {"min": least}, "", value is not None and value >= least, parameters=parameters)
-
-
-def _at_most(name: str, value: float | None, most: float | None, unit: str = "") -> Check:
-    """A share of no frames keeps its limit, because no answer was expected."""
-    if most is None:
-        return Check(name, value, {}, unit)
-    return Check(name, value, {"max": most}, unit, value is None or value <= most)

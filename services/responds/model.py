@@ -196,35 +196,30 @@ class ResponseEvaluator(Evaluator):
         """Each measure with its limit, of so many frames answered in time among those judged."""
         limits, broken = self._limits, self._broken
         share, low, high = answered / judged, self._lowest, self._highest
-        yield Check("share", share, {"min": limits.share}, "", share >= limits.share)
-        yield Check("frames", answered, {"min": limits.frames}, "", answered >= limits.frames)
+        yield Check.least("share", share, limits.share)
+        yield Check.least("frames", answered, limits.frames)
         if limits.low is not None:
-            ok = low is not None and low >= limits.low
-            yield Check("lowest", low, {"min": limits.low}, "", ok, parameters=("min",))
+            yield Check.least("lowest", low, limits.low, parameters=("min",))
         if limits.high is not None:
-            ok = high is not None and high <= limits.high
-            yield Check("highest", high, {"max": limits.high}, "", ok, parameters=("max",))
-        yield Check("broken", broken, {"max": 0}, "", not broken)
+            yield Check.most("highest", high, limits.high, parameters=("max",))
+        yield Check.most("broken", broken, 0)
         yield Check("late", self._late)
         yield Check("delay", self._delay, {}, "s")
 
     def _fault(self, check: Check, judged: Times) -> str:
         if check.name == "share":
             return f"answered {int(self._answered[judged].sum())} of {len(judged)} frames in time, a share of " + (
-                f"{check.value:.4g} (at least {self._limits.share:g}){self._longest(judged)}"
+                f"{check.told} ({check.bound}){self._longest(judged)}"
             )
         if check.name == "frames":
-            return f"only {check.value} frames were answered (at least {self._limits.frames})"
+            return f"only {check.value} frames were answered ({check.bound})"
         if check.name == "broken" and self._first_broken:
             first = self._first_broken
             what = (
                 "1 value is not a finite number" if check.value == 1 else f"{check.value} values are not finite numbers"
             )
             return f"{what}, the first is {first.field} at {first.time:.2f} s"
-        side, bound = next(iter(check.limit.items()))
-        word = "most" if side == "max" else "least"
-        value = "nothing" if check.value is None else f"{check.value:z.6g}"
-        return f"the {check.name} {self._field} is {value} (at {word} {bound:g})"
+        return f"the {check.name} {self._field} is {check.told} ({check.bound})"
 
     def _longest(self, judged: Times) -> str:
         """Where the longest run of frames without an answer is."""

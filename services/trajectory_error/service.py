@@ -141,11 +141,10 @@ class TrajectoryError(Evaluator):
     def checks(self, found: Mapping[str, float]) -> Iterator[Check]:
         """Measures by their names, each with its limit."""
         for name, (unit, _) in _MEASURES.items():
-            value, side, limit = found.get(name), "max", self._most.get(name)
             if name == "estimates":
-                side, limit = "min", self._flags["min-estimates"]
-            ok = limit is None or (value is not None and (value <= limit if side == "max" else value >= limit))
-            yield Check(name, value, {} if limit is None else {side: limit}, unit, ok)
+                yield Check.least(name, found.get(name), self._flags["min-estimates"])
+            else:
+                yield Check.most(name, found.get(name), self._most.get(name), unit)
 
     def _say(self, check: Check) -> str:
         delta, when = (
@@ -171,10 +170,4 @@ def _row(pose: Any) -> list[float] | None:
 
 
 def _told(check: Check) -> str:
-    """The value, in full where rounding would hide that it broke its limit, and the limit."""
-    side, limit = next(iter(check.limit.items()), ("", 0.0))
-    value, bound = check.value, f" (at {'most' if side == 'max' else 'least'} {limit:g})" if side else ""
-    if value is None or isinstance(value, int):
-        return f"{'nothing' if value is None else value}{bound}"
-    short = f"{round(value, 6):.4g}"
-    return f"{short if check.ok or short != f'{limit:.4g}' else value} {check.unit}{bound}"
+    return f"{check.told} {check.unit if isinstance(check.value, float) else ''}".rstrip() + f" ({check.bound})"
