@@ -135,6 +135,9 @@ def parse(manifest: Mapping[str, Any], argv: Sequence[str]) -> Flags:
     """The values that a command line gives; raises FlagsError."""
     known, words = parameters(manifest), vars(parser(manifest).parse_args(argv))
     given = {name: _value(name, known[name], text) for name, text in words.items()}
+    for group in manifest.get("one-of") or ():
+        if not any(name in given for name in group):
+            raise FlagsError(f"give one or more of --{', --'.join(group)}")
     values = Flags({name: given.get(name, _default(about)) for name, about in known.items()})
     for name in given:
         for other, wanted in (known[name].get("when") or {}).items():
@@ -161,6 +164,8 @@ def _value(name: str, about: About, text: str) -> Value:
         raise FlagsError(f"--{name}={text} is not one of {bounds(about)}")
     if isinstance(value, Share) and not about.get("or-share"):
         raise FlagsError(f"--{name}={text} is a share, expected {expected}")
+    if isinstance(value, int) and value % (step := about.get("multiple-of", 1)):
+        raise FlagsError(f"--{name}={text} is not a multiple of {step}")
     if not _allowed(about, value):
         raise FlagsError(f"--{name}={text} is out of range, expected {bounds(about)}{unit(about)}")
     return value

@@ -105,8 +105,6 @@ def build(context: Context) -> Service:
     """The service from its flags: it is ready when the first picture has come."""
     flags = context.flags
     width, height, freq = flags["width"], flags["height"], flags["freq"]
-    if width % 2 or height % 2:
-        raise ValueError(f"--width={width} and --height={height} must be even for I420")
     names = {kind: flags[f"name.{kind}"] for kind in pixels.FORMATS}
     memories = [(context.memory(name, pixels.size(kind, width, height)), kind) for kind, name in names.items() if name]
     telemetry = CameraTelemetry(

@@ -94,8 +94,6 @@ def _port(text: str, context: Context) -> tuple[str, int | None]:
 def _bodies(flags: Flags) -> Footprints:
     """The bodies that the flags ask for; raises InputError, and ValueError if there are none."""
     if not flags["bodies"]:
-        if flags["min-body-margin"]:
-            raise ValueError("--min-body-margin needs --bodies")
         return {}
     found = load_footprints(Path(flags["map-path"]), flags["frame-id"])
     if not found:

@@ -25,7 +25,6 @@ from services.continuous_signal.target import (
 )
 
 RECORDING = ".rec"
-REQUIRED = ("max-mean", "max-std", "max-distance", "min-share", "min-frame-share", "min-sign-share")
 
 
 class ContinuousSignal(SignalEvaluator):
@@ -102,8 +101,6 @@ def _frames(flags: Flags, target: Target) -> Times | None:
 
 
 def _limits(flags: Flags) -> SignalLimits:
-    if all(flags[name] is None for name in REQUIRED):
-        raise ValueError(f"no limit: give one or more of --{', --'.join(REQUIRED)}")
     for name in ("min-share", "min-frame-share"):
         if flags[name] is not None and flags["band"] is None:
             raise ValueError(f"--{name} needs --band, the distance that counts as inside")

@@ -46,7 +46,7 @@ def build(context: Context) -> Coverage:
 def _area(flags: Flags) -> shapely.Geometry:
     """The loop of the map, or the rectangle; raises InputError, and ValueError for what is not an area."""
     name, path, sides = flags["area"], flags["map-path"], [flags[side] for side in _SIDES]
-    if (name is None) == (sides == [None] * len(_SIDES)):
+    if name is not None and sides != [None] * len(_SIDES):
         raise ValueError("give the area either as a loop of the map, --area, or as a rectangle, --x-min and so on")
     if name is None:
         if missing := [side for side in _SIDES if flags[side] is None]:

@@ -58,7 +58,7 @@ def _handler(value: Callable[[Any], Value], take: Take) -> Handler:
 def _truth(flags: Flags) -> Truth | None:
     """The truth from its file, None for one that comes live."""
     path, sender, classes = flags["truth"], flags["truth-sender"], flags["classes"]
-    if (path is None) == (sender is None):
+    if path is not None and sender is not None:
         raise ValueError("give the true boxes either as a file, --truth, or as messages, --truth-sender")
     if sender == flags["sender"]:
         raise ValueError(f"--truth-sender={sender} is the --sender of the detections")
@@ -80,7 +80,5 @@ def _rules(flags: Flags) -> Rules:
 
 def _limits(flags: Flags) -> DetectionLimits:
     precision, recall, f1 = (flags[f"min-{name}"] for name in MEASURES)
-    if precision is recall is f1 is None:
-        raise ValueError("no limit: give one or more of --min-precision, --min-recall, --min-f1")
     silence = flags["max-unanswered"], flags["max-gap"]
     return DetectionLimits(precision, recall, f1, flags["min-frames"], flags["each-class"], *silence)

@@ -53,8 +53,6 @@ def _is_single(context: Context) -> bool:
 
 def _frames(flags: Flags) -> Frames:
     if not flags["rec"]:
-        if flags["freq"] is None:
-            raise ValueError("no frames are known: give --rec, the recording that is played, or --freq of the camera")
         return at_rate(flags["freq"], flags["max-time"])
     part = PlayedPart(
         sender=flags["video-sender"] or 0,

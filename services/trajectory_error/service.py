@@ -40,8 +40,6 @@ class TrajectoryError(Evaluator):
         self._flags = flags = context.flags
         super().__init__(flags["max-time"])
         self._most = {name: flags[f"max-{name}"] for name in _LIMITS if flags[f"max-{name}"] is not None}
-        if not self._most:
-            raise ValueError(f"no limit: give one or more of {', '.join(f'--max-{name}' for name in _LIMITS)}")
         if flags["delta-unit"] == "frames" and not flags["delta"].is_integer():
             raise ValueError(f"--delta={flags['delta']:g} is not a whole number of frames")
         self._most |= {"gap": flags["max-gap"], "broken": 0, "repeated": 0}

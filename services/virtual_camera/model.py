@@ -37,12 +37,10 @@ class VirtualCamera:
     ) -> None:
         """``mounted`` is the camera in the body frame, ``start`` the body before any frame.
 
-        The renderer draws what ``optics`` need. ValueError when I420 cannot hold the picture.
+        The renderer draws what ``optics`` need.
         """
         self._optics = optics or Optics(renderer.camera)
         width, height = self._optics.camera.width, self._optics.camera.height
-        if width % 2 or height % 2:
-            raise ValueError(f"width and height must be even for I420, and {width} x {height} are not")
         self._renderer, self._mounted, self._publish = renderer, mounted, publish
         self._argb = np.empty((height, width, 4), np.uint8)
         self._i420 = np.empty((height * 3 // 2, width), np.uint8)

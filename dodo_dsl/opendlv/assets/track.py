@@ -330,8 +330,6 @@ def track(flags: Mapping[str, Any]) -> Track:
     """The obstacles that the flags name, of the map; raises InputError, and ValueError if they make no track."""
     path, goal, walls, gates = Path(flags["map-path"]), flags["goal"], flags["walls"], flags["gates"]
     least = flags["min-distance"]
-    if not (goal or walls or gates or least):
-        raise ValueError("nothing to judge: give --goal, --gates, --walls or --min-distance")
     if least is None:
         least = 0.0 if goal or gates else flags["length"]
     if goal in walls:

@@ -147,7 +147,6 @@ def test_slow_frames_and_a_single_one_are_waited_for(lane: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"goal": None, "walls": []}, "nothing to judge: give --goal, --gates, --walls or --min-distance"),
         ({"goal": "left"}, "--goal=left is one of the --walls too"),
         ({"gates": ["finish", "left"]}, "left of --gates is one of the --walls too"),
         ({"gates": ["finnish"]}, "--gates: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"),

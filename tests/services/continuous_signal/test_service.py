@@ -107,12 +107,6 @@ def test_flags_that_leave_something_open_are_refused(table: Path, words: tuple[s
     assert said in str(raised.value)
 
 
-def test_a_test_without_a_limit_is_refused(table: Path) -> None:
-    open_ended = Flags({**flags(f"--target={table}"), "max-mean": None})
-    with pytest.raises(ValueError, match=r"^no limit: give one or more of --max-mean, --max-std, --"):
-        ContinuousSignal(Context("continuous-signal", open_ended, MessageSet.standard()))
-
-
 def test_a_silent_application_fails_when_the_time_is_over(table: Path) -> None:
     judge = service(f"--target={table}", "--max-time=0.05")
     judge.begin(START)

@@ -116,7 +116,6 @@ def test_without_a_frame_there_is_no_verdict_and_a_vehicle_that_stands_fails() -
 @pytest.mark.parametrize(
     ("flags", "said"),
     [
-        ((), "give the area either as a loop of the map, --area, or as a rectangle, --x-min and so on"),
         (
             ("--area=a", *RECTANGLE),
             "give the area either as a loop of the map, --area, or as a rectangle, --x-min and so",

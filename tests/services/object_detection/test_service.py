@@ -41,13 +41,9 @@ def test_it_hears_what_its_flags_name(truth: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (LIMITS, "give the true boxes either as a file, --truth, or as messages, --truth-sender"),
+        (LIMITS, "give one or more of --truth, --truth-sender"),
         ((*LIMITS, "--truth=TRUTH", "--truth-sender=9"), "give the true boxes either as a file"),
         ((*LIMITS, "--truth-sender=0"), "--truth-sender=0 is the --sender of the detections"),
-        (
-            ("--truth=TRUTH",),
-            "no limit: give one or more of --min-precision, --min-recall, --min-f1",
-        ),
         (
             (*LIMITS, "--truth=TRUTH", "--max-time=1"),
             "no frame would be judged: --max-time must be longer than --from",

@@ -148,7 +148,6 @@ def test_frames_are_due_as_the_player_shows_them(tmp_path: Path, timemod: float)
 @pytest.mark.parametrize(
     ("flags", "said"),
     [
-        ((*ANSWER,), "no frames are known: give --rec, the recording that is played, or --freq of the camera"),
         ((ANSWER[0], "--freq=1", "--min=1"), "--min and --max need --field, the number that they are bounds of"),
         ((ANSWER[0], "--field=x", "--freq=1"), f"{STEERING} has no number 'x', expected one of groundSteering"),
         ((*ANSWER[:2], "--min=1", "--max=-1", "--freq=1"), "--min=1 is more than --max=-1"),

@@ -153,7 +153,6 @@ def test_without_a_truth_to_judge_by_there_is_no_verdict(flags: Any, frames: lis
 @pytest.mark.parametrize(
     ("flags", "said"),
     [
-        ((), "no limit: give one or more of --max-ate, --max-error, --max-rotation, --max-rpe, --max-rpe-rotation"),
         (("--max-rpe=1", "--delta=0.5"), "--delta=0.5 is not a whole number of frames"),
         (("--max-rpe=1", "--delta-unit=km"), "--delta-unit=km is not one of frames, m, s"),
     ],

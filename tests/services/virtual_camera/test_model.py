@@ -80,13 +80,6 @@ def test_i420_follows_bt601():
         assert planes == pytest.approx([luma] * 4 + [u, v], abs=1)
 
 
-@pytest.mark.parametrize("size", [(63, 48), (64, 47)])
-def test_odd_sizes_are_refused(cube_at, size):
-    renderer = Renderer(load_scene(cube_at([3, 0, 0, 0])), *size, 1.0)
-    with pytest.raises(ValueError, match=f"must be even for I420, and {size[0]} x {size[1]} are not"):
-        VirtualCamera(renderer, mount(0, 0, 0, 0, 0, 0), Pictures())
-
-
 @pytest.mark.parametrize("bad", [{"qw": 0.0}, {"x": math.nan}, {"y": math.inf}, {"z": 2e6}, {"qx": math.nan}])
 def test_a_frame_without_a_pose_is_refused_counted_and_told_once(renderer, pictures, caplog, bad):
     camera = VirtualCamera(renderer, mount(0, 0, 0.1, 0, 0, 0), pictures)
