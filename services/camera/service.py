@@ -1,14 +1,13 @@
 """The camera as a service: pictures into shared memory at a fixed rate, and its state for observers of the bus."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
-from dodo_dsl.opendlv import pixels
 from dodo_dsl.opendlv.message_set import MessageSet
-from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.base import Context, Flags, Output, Service, period_of
+from services.base.pictures import Memories, memories, show
 from services.base.process import interruptible
-from services.camera.picture import CameraError, Image, SharedPicture
+from services.camera.picture import CameraError, SharedPicture
 from services.camera.sources import FIRST, Camera, FileCamera, Grabber, RpiCamera, V4l2Camera, longest_silence
 
 STATES = ("the camera gives pictures", "the camera gives no picture")
@@ -49,7 +48,7 @@ class RigCameraService(Service):
     def __init__(
         self,
         camera: Grabber | FileCamera,
-        memories: Sequence[tuple[SharedMemory, str]],
+        memories: Memories,
         freq: float,
         telemetry: CameraTelemetry,
     ) -> None:
@@ -64,19 +63,9 @@ class RigCameraService(Service):
         )
         if picture is not None:
             time = now if picture.time is None else picture.time
-            pictures = pixels.with_copies(picture.argb, picture.i420, (kind for _, kind in self._memories))
-            for memory, kind in self._memories:
-                share(memory, pictures[kind], time)
+            show(self._memories, picture.argb, picture.i420, time)
             self.shared += 1
         return self._telemetry.update(picture is not None, now)
-
-
-def share(memory: SharedMemory, image: Image, time: int) -> None:
-    """Copy an image and stamp it under the lock, then notify readers."""
-    with memory.lock():
-        memory.buffer[: image.nbytes] = image.data.cast("B")
-        memory.stamp(time)
-    memory.notify_all()
 
 
 def open_camera(flags: Flags) -> Camera:
@@ -104,9 +93,7 @@ def open_camera(flags: Flags) -> Camera:
 def build(context: Context) -> Service:
     """The service from its flags: it is ready when the first picture has come."""
     flags = context.flags
-    width, height, freq = flags["width"], flags["height"], flags["freq"]
-    names = {kind: flags[f"name.{kind}"] for kind in pixels.FORMATS}
-    memories = [(context.memory(name, pixels.size(kind, width, height)), kind) for kind, name in names.items() if name]
+    freq, shared = flags["freq"], memories(context, flags["width"], flags["height"])
     telemetry = CameraTelemetry(
         context.messages, flags["status-id"], 2 * max(period_of(freq), round(flags["exposure"] * 1e6))
     )
@@ -115,11 +102,11 @@ def build(context: Context) -> Service:
         context.log.warning("%s", note)
     if isinstance(camera, FileCamera):
         context.resources.callback(camera.close)
-        return RigCameraService(camera, memories, freq, telemetry)
+        return RigCameraService(camera, shared, freq, telemetry)
     silence = longest_silence(freq, flags["exposure"])
     grabber, first = Grabber(camera, flags["source"], silence), max(FIRST, silence)
     context.resources.callback(grabber.close)
     with interruptible():
         if not grabber.wait(first):
             raise CameraError(f"the camera {flags['source']} gave no picture for {first:g} s")
-    return RigCameraService(grabber, memories, freq, telemetry)
+    return RigCameraService(grabber, shared, freq, telemetry)

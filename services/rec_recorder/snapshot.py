@@ -3,9 +3,8 @@
 import logging
 from pathlib import Path
 
-import cv2
-
 from dodo_dsl.opendlv import pixels
+from services.base.pictures import png
 from services.rec_recorder.source import PictureSource
 
 _log = logging.getLogger(__name__)
@@ -44,12 +43,10 @@ class SnapshotWriter:
 
     def _write(self, data: bytes) -> None:
         layout = self._source.spec.layout(len(data))
-        done, png = cv2.imencode(".png", pixels.to_bgr(pixels.view(data, *layout), layout[0]))
-        if not done:
-            raise OSError(f"a picture of {layout[1]} x {layout[2]} pixels cannot be encoded")
+        encoded = png(pixels.to_bgr(pixels.view(data, *layout), layout[0]))
         part = self._path.with_name(f".{self._path.name}.part")
         with part.open("xb") as file:
-            file.write(png.tobytes())
+            file.write(encoded)
         try:
             if not self._is_ours:
                 self._path.hardlink_to(part)  # what is there already is not this recorder's to replace

@@ -17,6 +17,7 @@ from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.recording_times import DAY
 from services.base import Context, Service
 from services.base.loop import TEST_BEGIN
+from services.base.pictures import memories
 from services.base.service import Framed, Output, period_of
 from services.rec_replay.selection import IMAGE, Part, Player, Selection, SelectionError, select
 from services.rec_replay.stream import EntryStream, PictureMemories, first_frame
@@ -199,12 +200,11 @@ def _memories(context: Context, recording: Recording, part: Part) -> PictureMemo
         return None
     frame = first_frame(recording, part.rows[part.shown])
     width, height = frame.width, frame.height
-    names = {kind: flags[f"name.{kind}"] for kind in pixels.FORMATS}
+    formats: tuple[str, ...] = pixels.FORMATS
     if width % 2 or height % 2:
         _log.warning("pictures of %d x %d pixels cannot be converted to I420", width, height)
-        del names["i420"]
-    sized = ((kind, name, pixels.size(kind, width, height)) for kind, name in names.items() if name)
-    return PictureMemories([(context.memory(name, size), kind) for kind, name, size in sized])
+        formats = tuple(kind for kind in formats if kind != "i420")
+    return PictureMemories(memories(context, width, height, formats))
 
 
 def _refuse_other_senders(recording: Recording, sender: int) -> None:

@@ -1,7 +1,7 @@
 """The entries of a part in order, read in blocks; pictures decoded ahead and put into shared memory."""
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,10 +11,9 @@ from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.frame_table import Fact
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
-from dodo_dsl.opendlv.pixels import with_copies
 from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.opendlv.shared_memory import SharedMemory
 from dodo_dsl.opendlv.video import DecodedFrame, VideoDecoder, VideoError, has_key_frame, refuse_large
+from services.base.pictures import Memories, show
 from services.rec_replay.selection import IMAGE, Part
 
 FARTHEST = 3000
@@ -111,12 +110,9 @@ def lead_in(recording: Recording, rows: Numbers, before: int) -> Iterator[Envelo
 
 
 class PictureMemories:
-    """Memories for pictures: each is copied and stamped under the lock, then announced.
+    """Memories for pictures. A picture of another size than the first is skipped, and counted in ``misfits``."""
 
-    A picture of another size than the first is skipped, and counted in ``misfits``.
-    """
-
-    def __init__(self, memories: Sequence[tuple[SharedMemory, str]]) -> None:
+    def __init__(self, memories: Memories) -> None:
         """Each memory with the format of its pictures, that in argb first."""
         self.shown = self.misfits = 0
         self._memories = memories
@@ -128,13 +124,7 @@ class PictureMemories:
                 _log.warning("skipped the picture of %d us, which has another size than the first", sample_time)
             self.misfits += 1
             return False
-        pictures = with_copies(picture.argb, picture.i420, (kind for _, kind in self._memories))
-        for memory, kind in self._memories:
-            if kind in pictures:
-                with memory.lock():
-                    memory.buffer[: pictures[kind].nbytes] = np.ascontiguousarray(pictures[kind]).data.cast("B")
-                    memory.stamp(sample_time)
-                    memory.notify_all()
+        show(self._memories, *picture, sample_time)
         self.shown += 1
         return True
 

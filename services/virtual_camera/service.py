@@ -7,21 +7,16 @@ from pathlib import Path
 
 import cv2
 
-from dodo_dsl.opendlv import pixels
-from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.base import Context, Flags, Output, Service, period_of
+from services.base.pictures import memories, show
 from services.scene.camera import CameraPose, Pinhole, mount
 from services.scene.lens import Alignment, Distortion
-from services.scene.raster import Image
 from services.scene.render import Renderer
 from services.scene.scene import Scene, SceneOptions, load_scene
 from services.scene.shading import Light
 from services.scene.truth import TruthSender, truth_sender
 from services.virtual_camera.model import Publish, VirtualCamera
 from services.virtual_camera.optics import Optics, Sensor, load_overlays
-
-Memories = list[tuple[SharedMemory, str]]
-"""Shared memory and what it holds: a format of ``pixels``."""
 
 
 class VirtualCameraService(Service):
@@ -36,20 +31,6 @@ class VirtualCameraService(Service):
     def update(self, now: int) -> Iterable[Output]:
         pose = self._camera.update(now)
         return self._truth_sender.outputs(pose) if self._truth_sender and pose else ()
-
-
-def publisher(memories: Memories) -> Publish:
-    """Writes all pictures as OpenDLV's readers expect: copied and stamped under the lock, then announced."""
-
-    def publish(argb: Image, i420: Image, sample_time: int) -> None:
-        pictures = pixels.with_copies(argb, i420, (kind for _, kind in memories))
-        for memory, kind in memories:
-            with memory.lock():
-                memory.buffer[: pictures[kind].nbytes] = pictures[kind].data.cast("B")
-                memory.stamp(sample_time)
-            memory.notify_all()
-
-    return publish
 
 
 def open_scene(flags: Flags) -> tuple[Renderer, Optics]:
@@ -90,16 +71,10 @@ def _start(flags: Flags) -> CameraPose | None:
     return CameraPose.at(x, y, 0.0, yaw=math.radians(yaw))
 
 
-def _memories(context: Context) -> Memories:
-    size = context.flags["width"] * context.flags["height"]
-    names = {kind: context.flags[f"name.{kind}"] for kind in pixels.FORMATS}
-    return [(context.memory(name, size * pixels.HALF_BYTES[kind] // 2), kind) for kind, name in names.items() if name]
-
-
 def build(context: Context) -> Service:
     """The service from its flags; raises InputError, ValueError and SharedMemoryError."""
     flags = context.flags
     renderer, optics = open_scene(flags)
-    publish = publisher(_memories(context))
+    publish = partial(show, memories(context, flags["width"], flags["height"]))
     camera = mounted_camera(flags, renderer, optics, publish)
     return VirtualCameraService(camera, flags["freq"], flags["frame-id"], truth_sender(context, renderer, optics.lens))

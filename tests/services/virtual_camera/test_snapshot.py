@@ -38,19 +38,19 @@ def test_the_vehicle_stands_where_its_flags_say(cube_at: Callable[..., Path], tm
 
 
 @pytest.mark.parametrize(
-    ("words", "sentence", "code"),
+    ("words", "sentence"),
     [
-        (("--truth-classes=cone=x",), "there is no model 'cone' in the map", 2),
-        (("--fovi=3",), "did you mean '--fovy'", 2),
-        (("--output=again.png",), "expected --output=FILE once", 2),
+        (("--truth-classes=cone=x",), "there is no model 'cone' in the map"),
+        (("--fovi=3",), "did you mean '--fovy'"),
+        (("--output=again.png",), "expected --output=FILE once"),
     ],
 )
 def test_what_gives_no_snapshot(
-    cube_at: Callable[..., Path], tmp_path: Path, words: tuple[str, ...], sentence: str, code: int
+    cube_at: Callable[..., Path], tmp_path: Path, words: tuple[str, ...], sentence: str
 ) -> None:
     given = (f"--map-path={cube_at([4, 0, 0, 0])}", f"--output={tmp_path / 'snapshot.png'}")
     found, said = snapshot(*given, *words)
-    assert found == code and sentence in said["error"]
+    assert found == 1 and sentence in said["error"]
     assert not (tmp_path / "snapshot.png").exists()
 
 
