@@ -40,91 +40,6 @@ class _Time(ctypes.Structure):
     _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
 
 
-class Header:
-    """The first bytes of a shared memory: its size, the mutex, the condition; raises OSError if a call fails."""
-
-    def __init__(self, memory: object) -> None:
-        self._bytes = (ctypes.c_ubyte * HEADER_BYTES).from_buffer(memory)  # type: ignore[arg-type]
-        address = ctypes.addressof(self._bytes)
-        self._mutex, self._condition = ctypes.c_void_p(address + MUTEX_AT), ctypes.c_void_p(address + CONDITION_AT)
-        self._size = ctypes.c_uint32.from_buffer(self._bytes)
-        self._numbers = (ctypes.c_uint32 * (_CONDITION_BYTES // 4)).from_buffer(self._bytes, CONDITION_AT)
-
-    @property
-    def size(self) -> int:
-        """Bytes of the data behind the header."""
-        return self._size.value
-
-    def make(self, size: int) -> None:
-        """Set up a new memory."""
-        attributes = ctypes.create_string_buffer(64)
-        _call("pthread_mutexattr_init", attributes)
-        _call("pthread_mutexattr_setpshared", attributes, _SHARED)
-        _call("pthread_mutexattr_setrobust", attributes, _ROBUST)
-        _call("pthread_mutex_init", self._mutex, attributes)
-        _call("pthread_condattr_init", attributes)
-        _call("pthread_condattr_setclock", attributes, CLOCK_MONOTONIC)
-        _call("pthread_condattr_setpshared", attributes, _SHARED)
-        _call("pthread_cond_init", self._condition, attributes)
-        self._size.value = size
-
-    def lock(self, timeout: float) -> bool:
-        """Take the mutex; False when ``timeout`` seconds are over."""
-        code = _libc.pthread_mutex_clocklock(self._mutex, CLOCK_MONOTONIC, ctypes.byref(_deadline(timeout)))
-        return self._taken(code)
-
-    def unlock(self) -> None:
-        """Let go of the mutex."""
-        _call("pthread_mutex_unlock", self._mutex)
-
-    def wait(self, timeout: float) -> bool:
-        """Wait for a notification with the mutex held; False when ``timeout`` seconds are over."""
-        until = ctypes.byref(_deadline(timeout))
-        return self._taken(_libc.pthread_cond_timedwait(self._condition, self._mutex, until))
-
-    def notify_all(self) -> None:
-        """Wake all that wait; raises TimeoutError if that would block as a waiter was killed.
-
-        Before 2.41, glibc counts those that were woken before and waits for them to leave; a killed one never does.
-        """
-        patience = time.monotonic() + _PATIENCE
-        while self._leaving():
-            if time.monotonic() > patience:
-                raise TimeoutError(errno.ETIMEDOUT, "a waiter was killed")
-            time.sleep(0.0005)
-        _call("pthread_cond_broadcast", self._condition)
-
-    def waiters(self) -> int:
-        """How many wait at this moment."""
-        return int(self._numbers[_WAITERS_AT // 4]) >> 3  # glibc counts by eights
-
-    def _leaving(self) -> int:
-        """How many that were woken before have not left yet (glibc's __g_refs by the lowest bit of __wseq)."""
-        if _NEW_LAYOUT:
-            return 0
-        first = self._numbers[0] & 1 ^ 1
-        return int(self._numbers[_REFERENCES_AT // 4 + first]) >> 1
-
-    def _taken(self, code: int) -> bool:
-        if code == errno.EOWNERDEAD:
-            _call("pthread_mutex_consistent", self._mutex)
-            return True
-        if code not in (0, errno.ETIMEDOUT):
-            raise OSError(code, os.strerror(code))
-        return code == 0
-
-
-def _call(name: str, *arguments: object) -> None:
-    code = getattr(_libc, name)(*arguments)
-    if code:
-        raise OSError(code, f"{name}: {os.strerror(code)}")
-
-
-def _deadline(seconds: float) -> _Time:
-    at = time.monotonic_ns() + round(max(0.0, seconds) * 1e9)
-    return _Time(*divmod(at, 1_000_000_000))
-
-
 FOLDER = Path("/dev/shm")  # where the C library's shm_open keeps its objects
 _SLICE = 0.1  # seconds
 MODE = 0o666
@@ -143,11 +58,16 @@ def path_of(name: str) -> Path:
 
 
 class PosixSegment:
-    """The object at ``path``; ``token`` is its descriptor."""
+    """The object at ``path``, whose descriptor is ``token``: its size, the mutex and the condition, then the data."""
 
-    def __init__(self, path: Path, token: int, memory: mmap.mmap, header: Header) -> None:
-        self.path, self.token, self.size = path, token, header.size
-        self._memory, self._header = memory, header
+    def __init__(self, path: Path, token: int, memory: mmap.mmap) -> None:
+        self.path, self.token = path, token
+        self._memory = memory
+        self._bytes = (ctypes.c_ubyte * HEADER_BYTES).from_buffer(memory)
+        address = ctypes.addressof(self._bytes)
+        self._mutex, self._condition = ctypes.c_void_p(address + MUTEX_AT), ctypes.c_void_p(address + CONDITION_AT)
+        self._size = ctypes.c_uint32.from_buffer(self._bytes)
+        self._numbers = (ctypes.c_uint32 * (_CONDITION_BYTES // 4)).from_buffer(self._bytes, CONDITION_AT)
 
     @classmethod
     def create(cls, path: Path, size: int) -> Self:
@@ -163,14 +83,13 @@ class PosixSegment:
             os.fchmod(token, MODE)
             fcntl.flock(token, fcntl.LOCK_SH | fcntl.LOCK_NB)  # shows other creators that we live
             os.posix_fallocate(token, 0, HEADER_BYTES + size)  # a full memory is an error now, not a SIGBUS later
-            memory = mmap.mmap(token, HEADER_BYTES + size)
-            header = Header(memory)
-            header.make(size)
+            made = cls(path, token, mmap.mmap(token, HEADER_BYTES + size))
+            made._set_up(size)
         except OSError as error:
             path.unlink(missing_ok=True)
             os.close(token)
             raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: {error.strerror}") from None
-        return cls(path, token, memory, header)
+        return made
 
     @classmethod
     def attach(cls, path: Path) -> Self:
@@ -181,12 +100,28 @@ class PosixSegment:
             raise SharedMemoryError(f"shared memory '{path.name}' does not exist: {path}: {error.strerror}") from None
         whole = os.fstat(token).st_size
         if whole > HEADER_BYTES:
-            memory = mmap.mmap(token, whole)
-            header = Header(memory)
-            if 0 < header.size <= whole - HEADER_BYTES:
-                return cls(path, token, memory, header)
+            found = cls(path, token, mmap.mmap(token, whole))
+            if 0 < found.size <= whole - HEADER_BYTES:
+                return found
         os.close(token)
         raise SharedMemoryError(f"shared memory '{path.name}' has no content (yet): {path} has {whole} bytes")
+
+    def _set_up(self, size: int) -> None:
+        attributes = ctypes.create_string_buffer(64)
+        _call("pthread_mutexattr_init", attributes)
+        _call("pthread_mutexattr_setpshared", attributes, _SHARED)
+        _call("pthread_mutexattr_setrobust", attributes, _ROBUST)
+        _call("pthread_mutex_init", self._mutex, attributes)
+        _call("pthread_condattr_init", attributes)
+        _call("pthread_condattr_setclock", attributes, CLOCK_MONOTONIC)
+        _call("pthread_condattr_setpshared", attributes, _SHARED)
+        _call("pthread_cond_init", self._condition, attributes)
+        self._size.value = size
+
+    @property
+    def size(self) -> int:
+        """Bytes of the data."""
+        return self._size.value
 
     def view(self) -> memoryview:
         """A view of the data, which keeps the memory mapped."""
@@ -194,10 +129,11 @@ class PosixSegment:
 
     def lock(self, timeout: float) -> Result:
         """Take the mutex; TIMEOUT when another holds it for ``timeout`` seconds. Raises OSError if it is broken."""
-        return Result.DONE if self._header.lock(timeout) else Result.TIMEOUT
+        code = _libc.pthread_mutex_clocklock(self._mutex, CLOCK_MONOTONIC, ctypes.byref(_deadline(timeout)))
+        return self._result(code)
 
     def unlock(self) -> None:
-        self._header.unlock()
+        _call("pthread_mutex_unlock", self._mutex)
 
     def wait(self, timeout: float | None) -> Result:
         """Wait for a notification; raises OSError when the creator has removed the memory.
@@ -206,25 +142,32 @@ class PosixSegment:
         """
         end = math.inf if timeout is None else time.monotonic() + timeout
         while True:
-            left = min(_SLICE, end - time.monotonic())
-            done = self._header.lock(left) and self._waited(min(_SLICE, end - time.monotonic()))
+            result = self.lock(min(_SLICE, end - time.monotonic()))
+            if result is Result.DONE:
+                try:
+                    until = ctypes.byref(_deadline(min(_SLICE, end - time.monotonic())))
+                    result = self._result(_libc.pthread_cond_timedwait(self._condition, self._mutex, until))
+                finally:
+                    self.unlock()
             if os.fstat(self.token).st_nlink == 0:
                 raise FileNotFoundError
-            if done or time.monotonic() >= end:
-                return Result.DONE if done else Result.TIMEOUT
-
-    def _waited(self, timeout: float) -> bool:
-        try:
-            return self._header.wait(timeout)
-        finally:
-            self._header.unlock()
+            if result is Result.DONE or time.monotonic() >= end:
+                return result
 
     def wake(self) -> None:
-        """Wake all that wait; raises TimeoutError if one of them was killed."""
-        self._header.notify_all()
+        """Wake all that wait; raises TimeoutError if that would block as a waiter was killed.
+
+        Before 2.41, glibc counts those that were woken before and waits for them to leave; a killed one never does.
+        """
+        patience = time.monotonic() + _PATIENCE
+        while self._leaving():
+            if time.monotonic() > patience:
+                raise TimeoutError(errno.ETIMEDOUT, "a waiter was killed")
+            time.sleep(0.0005)
+        _call("pthread_cond_broadcast", self._condition)
 
     def readers_waiting(self) -> int:
-        return self._header.waiters()
+        return int(self._numbers[_WAITERS_AT // 4]) >> 3  # glibc counts by eights
 
     def close(self) -> None:
         """Forget the object; its memory lives as long as the views of it."""
@@ -237,6 +180,32 @@ class PosixSegment:
                 self.path.unlink()
         with suppress(TimeoutError):
             self.wake()
+
+    def _leaving(self) -> int:
+        """How many that were woken before have not left yet (glibc's __g_refs by the lowest bit of __wseq)."""
+        if _NEW_LAYOUT:
+            return 0
+        first = self._numbers[0] & 1 ^ 1
+        return int(self._numbers[_REFERENCES_AT // 4 + first]) >> 1
+
+    def _result(self, code: int) -> Result:
+        """Of a call that takes the mutex, which its dead holder may have left."""
+        if code == errno.EOWNERDEAD:
+            _call("pthread_mutex_consistent", self._mutex)
+        elif code not in (0, errno.ETIMEDOUT):
+            raise OSError(code, os.strerror(code))
+        return Result.TIMEOUT if code == errno.ETIMEDOUT else Result.DONE
+
+
+def _call(name: str, *arguments: object) -> None:
+    code = getattr(_libc, name)(*arguments)
+    if code:
+        raise OSError(code, f"{name}: {os.strerror(code)}")
+
+
+def _deadline(seconds: float) -> _Time:
+    at = time.monotonic_ns() + round(max(0.0, seconds) * 1e9)
+    return _Time(*divmod(at, 1_000_000_000))
 
 
 def _remove_orphan(path: Path) -> None:

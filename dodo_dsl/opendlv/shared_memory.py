@@ -8,7 +8,7 @@ import errno
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from types import TracebackType
 from typing import Self
 
@@ -70,15 +70,19 @@ class SharedMemory:
         The creator's error is a MemoryTakenError, here and wherever the memory turns out to be broken.
         """
         deadline = time.monotonic() + timeout
-        while (result := self._take(deadline - time.monotonic())) is not Result.DONE:
-            if result is Result.TIMEOUT:
-                raise self._error(f"was locked by another for {timeout:g} s")
+        result = Result.SIGNAL
+        while result is Result.SIGNAL:
+            with self._used() as segment:
+                result = segment.lock(deadline - time.monotonic())
+        if result is Result.TIMEOUT:
+            raise self._error(f"was locked by another for {timeout:g} s")
         self._locked = True
         try:
             yield
         finally:
             self._locked = False
-            self._release()
+            with self._used() as segment:
+                segment.unlock()
 
     def stamp(self, time_us: int) -> None:
         """Sets when the content was sampled (microseconds since the epoch); only while locked."""
@@ -97,28 +101,21 @@ class SharedMemory:
         It happens under the lock: a quick reader would else come back while the condition is still 0 and read the
         same content again. Raises SharedMemoryError as ``lock`` does.
         """
-        if self._locked:
-            self._wake()
-            return
-        with self.lock():
-            self._wake()
+        with nullcontext() if self._locked else self.lock(), self._used() as segment:
+            segment.wake()
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait for a notification without spinning: False when ``timeout`` seconds are over, or (SysV) a signal came.
 
         Raises SharedMemoryError when the creator has removed the memory.
         """
-        try:
-            return self._segment.wait(timeout) is Result.DONE
-        except OSError as error:
-            raise self._failed(error) from None
+        with self._used() as segment:
+            return segment.wait(timeout) is Result.DONE
 
     def readers_waiting(self) -> int:
         """How many processes wait for a notification at this moment."""
-        try:
-            return self._segment.readers_waiting()
-        except OSError as error:
-            raise self._failed(error) from None
+        with self._used() as segment:
+            return segment.readers_waiting()
 
     @property
     def is_there(self) -> bool:
@@ -147,35 +144,22 @@ class SharedMemory:
     ) -> None:
         self.close()
 
-    def _wake(self) -> None:
-        try:
-            self._segment.wake()
-        except OSError as error:
-            raise self._failed(error) from None
-
-    def _take(self, timeout: float) -> Result:
-        try:
-            return self._segment.lock(timeout)
-        except OSError as error:
-            raise self._failed(error) from None
-
-    def _release(self) -> None:
-        try:
-            self._segment.unlock()
-        except OSError as error:
-            raise self._failed(error) from None
-
     def _need_lock(self) -> None:
         if not self._locked:
             raise SharedMemoryError(f"shared memory '{self.name}' must be locked for its time stamp")
 
-    def _failed(self, error: OSError) -> SharedMemoryError:
-        reasons = {
-            errno.ETIMEDOUT: "cannot notify any more: a reader was killed while it waited",
-            errno.ENOTRECOVERABLE: "cannot be locked any more: its holder was killed",
-        }
-        remover = "another" if self._owner else "its creator"
-        return self._error(reasons.get(error.errno or 0, f"was removed by {remover}"))
+    @contextmanager
+    def _used(self) -> Iterator[Segment | PosixSegment]:
+        """The segment, whose OSErrors become sentences."""
+        try:
+            yield self._segment
+        except OSError as error:
+            reasons = {
+                errno.ETIMEDOUT: "cannot notify any more: a reader was killed while it waited",
+                errno.ENOTRECOVERABLE: "cannot be locked any more: its holder was killed",
+            }
+            remover = "another" if self._owner else "its creator"
+            raise self._error(reasons.get(error.errno or 0, f"was removed by {remover}")) from None
 
     def _error(self, what: str) -> SharedMemoryError:
         kind = MemoryTakenError if self._owner else SharedMemoryError

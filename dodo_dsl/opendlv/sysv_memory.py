@@ -79,7 +79,7 @@ def move_to_other_inode(path: Path) -> None:
             tried.append(spare)
             os.fchmod(token, TOKEN_MODE)
             os.close(token)
-            if not token_collides(spare):
+            if twin_token(spare) is None:
                 spare.replace(path)
                 return
     except OSError as error:
@@ -88,11 +88,6 @@ def move_to_other_inode(path: Path) -> None:
         for spare in tried:
             spare.unlink(missing_ok=True)
     raise SharedMemoryError(f"{path}: no free key for shared memory in {TOKEN_ATTEMPTS} attempts")
-
-
-def token_collides(path: Path) -> bool:
-    """Whether another file of the folder has the keys of this one."""
-    return twin_token(path) is not None
 
 
 def twin_token(path: Path) -> Path | None:
@@ -136,6 +131,9 @@ class Result(Enum):
     SIGNAL = auto()
 
 
+_ENDED = {errno.EAGAIN: Result.TIMEOUT, errno.EINTR: Result.SIGNAL}
+
+
 def operate_semaphore(id_: int, value: int, timeout: float | None, undo: bool = False) -> Result:
     """Add ``value`` to a semaphore (waiting while it would become negative), or wait for zero if ``value`` is 0.
 
@@ -149,10 +147,8 @@ def operate_semaphore(id_: int, value: int, timeout: float | None, undo: bool = 
     if _libc.semtimedop(id_, ctypes.byref(operation), 1, limit) == 0:
         return Result.DONE
     code = ctypes.get_errno()
-    if code == errno.EAGAIN:
-        return Result.TIMEOUT
-    if code == errno.EINTR:
-        return Result.SIGNAL
+    if code in _ENDED:
+        return _ENDED[code]
     raise OSError(code, os.strerror(code))
 
 
@@ -177,7 +173,7 @@ class Segment:
             token, existed = open_or_create_token(path)
             try:
                 status = os.fstat(token)
-                if not token_collides(path) and _clear(path, status, existed):
+                if twin_token(path) is None and _clear(path, status, existed):
                     return cls(path, token, *_made(status, size))
             except sysv_ipc.ExistentialError:
                 pass  # another creator had the same key in the same moment
@@ -202,12 +198,11 @@ class Segment:
                 sysv_ipc.Semaphore(token_key(status, MUTEX)),
                 sysv_ipc.Semaphore(token_key(status, CONDITION)),
             )
-        except sysv_ipc.Error as error:
+        except (sysv_ipc.Error, SharedMemoryError) as error:
             os.close(token)
+            if isinstance(error, SharedMemoryError):
+                raise
             raise SharedMemoryError(f"shared memory '{path.name}' has no content (yet): {error}") from None
-        except SharedMemoryError:
-            os.close(token)
-            raise
 
     def view(self) -> memoryview:
         """A view of the data; the segment is detached when this view and all that came of it are gone."""
@@ -283,27 +278,21 @@ def _made(status: os.stat_result, size: int) -> tuple[sysv_ipc.SharedMemory, sys
 
 def _clear(path: Path, status: os.stat_result, existed: bool) -> bool:
     """Remove what a dead creator left; False if the keys belong to a memory of another name or another user."""
-    try:
-        return _remove_leftover(path, status, existed)
-    except sysv_ipc.PermissionsError:
-        return False
-
-
-def _remove_leftover(path: Path, status: os.stat_result, existed: bool) -> bool:
-    """As above; raises sysv_ipc.PermissionsError for what belongs to another user."""
-    with suppress(sysv_ipc.ExistentialError):
-        memory = sysv_ipc.SharedMemory(token_key(status, MEMORY))
-        users = memory.number_attached - 1
-        memory.detach()
-        if users and not existed:
-            return False
-        if users and _alive(memory.creator_pid):
-            raise SharedMemoryError(f"process {memory.creator_pid} uses it ({path})")
-        memory.remove()
-    for project in (MUTEX, CONDITION):
+    with suppress(sysv_ipc.PermissionsError):
         with suppress(sysv_ipc.ExistentialError):
-            sysv_ipc.Semaphore(token_key(status, project)).remove()
-    return True
+            memory = sysv_ipc.SharedMemory(token_key(status, MEMORY))
+            users = memory.number_attached - 1
+            memory.detach()
+            if users and not existed:
+                return False
+            if users and _alive(memory.creator_pid):
+                raise SharedMemoryError(f"process {memory.creator_pid} uses it ({path})")
+            memory.remove()
+        for project in (MUTEX, CONDITION):
+            with suppress(sysv_ipc.ExistentialError):
+                sysv_ipc.Semaphore(token_key(status, project)).remove()
+        return True
+    return False
 
 
 def _refuse_twin(path: Path) -> None:
@@ -323,8 +312,6 @@ def _alive(pid: int) -> bool:
         return False
     try:
         os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
+    except OSError as error:
+        return error.errno != errno.ESRCH
     return True

@@ -129,9 +129,9 @@ def test_colliding_keys_are_avoided(memory_name: str) -> None:
     twin.touch()
     os.link(twin, path)  # the same inode gives the same keys, as two inodes 65536 apart would
     try:
-        assert sysv_memory.token_collides(path)
+        assert sysv_memory.twin_token(path)
         with SharedMemory.create(memory_name, 10) as memory:
-            assert not sysv_memory.token_collides(path)
+            assert not sysv_memory.twin_token(path)
             memory.buffer[0] = 1
             with SharedMemory.attach(memory_name) as reader:
                 assert reader.buffer[0] == 1
