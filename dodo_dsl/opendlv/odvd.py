@@ -11,7 +11,7 @@ Fields without an id are counted from 1 in their order. An error names file, lin
 import functools
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -70,17 +70,7 @@ def tokens(text: str, file: str) -> Iterator[Token]:
     yield Token("end", "", TextPlace(file, line, position - line_start + 1))
 
 
-INTEGER_BITS = {
-    "char": 8,
-    "uint8": 8,
-    "int8": 8,
-    "uint16": 16,
-    "int16": 16,
-    "uint32": 32,
-    "int32": 32,
-    "uint64": 64,
-    "int64": 64,
-}
+INTEGER_BITS = {"char": 8} | {f"{kind}{bits}": bits for bits in (8, 16, 32, 64) for kind in ("uint", "int")}
 SCALARS = frozenset(INTEGER_BITS) | {"bool", "float", "double", "string", "bytes"}
 
 Default = bool | int | float | str | None
@@ -93,24 +83,20 @@ def integer_range(type_: str) -> range:
 
 
 def default_of(type_: str, token: Token) -> Default:
-    value = _value(type_, token)
-    if value is None:
-        raise OdvdError(f"{token.place}: {token} is not a default for a field of type '{type_}'")
-    return value
-
-
-def _value(type_: str, token: Token) -> Default:
-    if type_ == "bool":
-        return {"true": True, "false": False}.get(token.text) if token.kind == "name" else None
-    if type_ in ("float", "double"):
-        return float(token.text) if token.kind == "number" else None
-    if type_ in ("string", "bytes"):
-        return token.text if token.kind == "string" else None
-    if type_ == "char" and token.kind == "char":
-        return ord(token.text) if ord(token.text) in integer_range(type_) else None
-    if type_ in INTEGER_BITS and token.kind == "number" and re.fullmatch(r"[+-]?[0-9]{1,20}", token.text):
-        return int(token.text) if int(token.text) in integer_range(type_) else None
-    return None
+    """The default that a token gives a field of a type; raises OdvdError."""
+    kind, text = token.kind, token.text
+    if type_ == "bool" and kind == "name" and text in ("true", "false"):
+        return text == "true"
+    if type_ in ("float", "double") and kind == "number":
+        return float(text)
+    if type_ in ("string", "bytes") and kind == "string":
+        return text
+    if type_ == "char" and kind == "char" and ord(text) in integer_range(type_):
+        return ord(text)
+    is_whole = type_ in INTEGER_BITS and kind == "number" and re.fullmatch(r"[+-]?[0-9]{1,20}", text)
+    if is_whole and int(text) in integer_range(type_):
+        return int(text)
+    raise OdvdError(f"{token.place}: {token} is not a default for a field of type '{type_}'")
 
 
 __all__ = ["Definition", "Field", "OdvdError", "TextPlace", "load", "parse"]
@@ -204,72 +190,61 @@ class _Parser:
 
     def messages(self) -> tuple[Definition, ...]:
         package = ""
-        if self._token.text == "package" and self._token.kind == "name":
-            self._next()
+        if self._has("name", "package"):
             package = self._expect("name", "the package's name").text
             self._sign(";")
         found: list[Definition] = []
-        used = _Used("message")
+        used: dict[str | int, TextPlace] = {}
         while self._token.kind != "end":
             message = self._message(package)
-            used.add(message.place, name=message.name, id=message.id)
+            _use(used, "message", message.place, message.name, message.id)
             found.append(message)
         return tuple(found)
 
     def _message(self, package: str) -> Definition:
-        if self._token.text != "message" or self._token.kind != "name":
+        if not self._has("name", "message"):
             self._fail("'message'")
-        self._next()
         name = self._expect("name", "the message's name")
         self._sign("[")
         id_ = self._identifier(MAX_MESSAGE_ID)
-        self._optional(",")
+        self._has("sign", ",")
         self._sign("]")
         self._sign("{")
         fields: list[Field] = []
-        used = _Used("field")
+        used: dict[str | int, TextPlace] = {}
         counted = 0
-        while not self._optional("}"):
-            entry, counted = self._field(counted)
-            used.add(entry.place, name=entry.name, id=entry.number)
+        while not self._has("sign", "}"):
+            entry = self._field(counted + 1)
+            counted += self._is_counted
+            _use(used, "field", entry.place, entry.name, entry.number)
             fields.append(entry)
         full_name = f"{package}.{name.text}" if package else name.text
         return Definition(full_name, id_, package, tuple(fields), name.place)
 
-    def _field(self, counted: int) -> tuple[Field, int]:
-        type_ = self._expect("name", "a field's type or '}'")
+    def _field(self, counted: int) -> Field:
+        type_ = self._expect("name", "a field's type or '}'").text
         name = self._expect("name", "the field's name")
         if "." in name.text:
             raise OdvdError(f"{name.place}: the field name '{name.text}' has a dot, expected a simple name")
-        options = self._options(type_.text)
+        number, default = 0, None
+        if self._has("sign", "["):
+            while not self._has("sign", "]"):
+                if self._has("name", "default"):
+                    self._sign("=")
+                    default = default_of(type_, self._token)
+                    self._next()
+                else:
+                    number = self._identifier(MAX_FIELD_NUMBER)
+                self._has("sign", ",")
         self._sign(";")
-        if options.number is None:
-            counted += 1
-        number = options.number or counted
-        if number in RESERVED_NUMBERS:
+        self._is_counted = not number
+        if (number or counted) in RESERVED_NUMBERS:
             raise OdvdError(f"{name.place}: field ids 19000 to 19999 are reserved by protobuf")
-        return Field(name.text, type_.text, number, options.default, name.place), counted
-
-    def _options(self, type_: str) -> "_Options":
-        number: int | None = None
-        default: Default = None
-        if not self._optional("["):
-            return _Options(None, None)
-        while not self._optional("]"):
-            if self._token.text == "default" and self._token.kind == "name":
-                self._next()
-                self._sign("=")
-                default = default_of(type_, self._token)
-                self._next()
-            else:
-                number = self._identifier(MAX_FIELD_NUMBER)
-            self._optional(",")
-        return _Options(number, default)
+        return Field(name.text, type_, number or counted, default, name.place)
 
     def _identifier(self, maximum: int) -> int:
-        if self._token.text != "id" or self._token.kind != "name":
+        if not self._has("name", "id"):
             self._fail("'id'")
-        self._next()
         self._sign("=")
         token = self._expect("number", "a number")
         if not re.fullmatch(r"[1-9][0-9]*", token.text) or int(token.text[:11]) > maximum:
@@ -279,6 +254,13 @@ class _Parser:
     def _next(self) -> None:
         self._token = next(self._stream, self._token)
 
+    def _has(self, kind: str, text: str) -> bool:
+        """Whether this comes; then it is passed."""
+        is_there = (self._token.kind, self._token.text) == (kind, text)
+        if is_there:
+            self._next()
+        return is_there
+
     def _expect(self, kind: str, what: str) -> Token:
         token = self._token
         if token.kind != kind:
@@ -287,39 +269,19 @@ class _Parser:
         return token
 
     def _sign(self, sign: str) -> None:
-        if not self._optional(sign):
+        if not self._has("sign", sign):
             self._fail(f"'{sign}'")
-
-    def _optional(self, sign: str) -> bool:
-        if self._token.kind != "sign" or self._token.text != sign:
-            return False
-        self._next()
-        return True
 
     def _fail(self, expected: str) -> NoReturn:
         raise OdvdError(f"{self._token.place}: expected {expected}, found {self._token}")
 
 
-@dataclass(frozen=True)
-class _Options:
-    number: int | None
-    default: Default
-
-
-@dataclass(frozen=True)
-class _Used:
-    """Names and ids seen so far, to refuse the second use."""
-
-    what: str
-    places: dict[tuple[str, str | int], TextPlace] = field(default_factory=dict)
-
-    def add(self, place: TextPlace, **keys: str | int) -> None:
-        for key, value in keys.items():
-            earlier = self.places.setdefault((key, value), place)
-            if earlier is not place:
-                raise OdvdError(
-                    f"{place}: the {key} '{value}' of this {self.what} is already used at line {earlier.line}"
-                )
+def _use(used: dict[str | int, TextPlace], what: str, place: TextPlace, name: str, id_: int) -> None:
+    """Note a name and an id; raises OdvdError where one is used a second time."""
+    keys: tuple[tuple[str, str | int], ...] = (("name", name), ("id", id_))
+    for key, value in keys:
+        if (earlier := used.setdefault(value, place)) is not place:
+            raise OdvdError(f"{place}: the {key} '{value}' of this {what} is already used at line {earlier.line}")
 
 
 STANDARD = Path(__file__).with_name("messages.odvd")

@@ -13,21 +13,12 @@ from dodo_dsl.opendlv.wire import MAX_NESTING, Shape
 MAX_FIELDS = 100_000
 
 _Proto = descriptor_pb2.FieldDescriptorProto
-_PROTO_TYPES: dict[str, "descriptor_pb2.FieldDescriptorProto.Type.ValueType"] = {
-    "bool": _Proto.TYPE_BOOL,
-    "char": _Proto.TYPE_UINT32,
-    "uint8": _Proto.TYPE_UINT32,
-    "uint16": _Proto.TYPE_UINT32,
-    "uint32": _Proto.TYPE_UINT32,
+_PROTO_TYPES: Mapping[str, "descriptor_pb2.FieldDescriptorProto.Type.ValueType"] = {
+    **{each: getattr(_Proto, f"TYPE_{each.upper()}") for each in SCALARS - INTEGER_BITS.keys()},
+    **dict.fromkeys(("char", "uint8", "uint16", "uint32"), _Proto.TYPE_UINT32),
+    **dict.fromkeys(("int8", "int16", "int32"), _Proto.TYPE_SINT32),
     "uint64": _Proto.TYPE_UINT64,
-    "int8": _Proto.TYPE_SINT32,
-    "int16": _Proto.TYPE_SINT32,
-    "int32": _Proto.TYPE_SINT32,
     "int64": _Proto.TYPE_SINT64,
-    "float": _Proto.TYPE_FLOAT,
-    "double": _Proto.TYPE_DOUBLE,
-    "string": _Proto.TYPE_STRING,
-    "bytes": _Proto.TYPE_BYTES,
 }
 _FIXED_SIZE = frozenset({"bool", "float", "double"})
 
