@@ -4,12 +4,12 @@ import functools
 import logging
 import re
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 
-from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv.shared_memory import SharedMemory
+from services.base.polled_memory import PolledMemory
 
-RETRY = 200_000
 PATIENCE, STEPPED_PATIENCE = 0.05, 2.0
 """Seconds to wait for a memory's lock; in lockstep nothing is lost by waiting for a reader that gets no processor."""
 COMMON_SIZES = (
@@ -17,7 +17,6 @@ COMMON_SIZES = (
     (1640, 1232), (1920, 1080), (2592, 1944), (3280, 2464),
 )  # fmt: skip
 
-HALF_BYTES = {"argb": 8, "bgr": 6, "i420": 3, "rgb": 6}  # twice the bytes per pixel
 _WRITTEN = re.compile(r"(?P<name>[^:]+)(:(?P<width>[1-9][0-9]{0,4})x(?P<height>[1-9][0-9]{0,4}))?")
 _log = logging.getLogger(__name__)
 _say_once = functools.cache(_log.info)
@@ -37,6 +36,8 @@ class MemorySpec:
 
     def layout(self, size: int) -> tuple[str, int, int]:
         """Format, width and height of the pictures in a memory of `size` bytes; raises SourceError."""
+        from dodo_dsl.opendlv.pixels import HALF_BYTES
+
         kinds = sorted(HALF_BYTES, key=lambda kind: not re.search(f"(?<!a){kind}", self.name))  # one in the name first
         for kind in kinds:
             for width, height in ((self.width, self.height),) if self.width else COMMON_SIZES:
@@ -61,12 +62,10 @@ def parse(text: str) -> MemorySpec:
     return MemorySpec(match["name"], int(match["width"] or 0), int(match["height"] or 0))
 
 
-class PictureSource:
+class PictureSource(PolledMemory):
     """The newest picture of a memory, at most one each `period` microseconds of its own sample times.
 
-    It polls the memory and never waits for a notification, so that a camera that counts its readers does not see it.
-    What is in the memory at first is skipped: it may not be a picture yet; in lockstep (``is_stepped``) it is one
-    if it has a sample time of the test.
+    In lockstep (``is_stepped``) what is in it at first is a picture if it has a sample time of the test.
     """
 
     def __init__(
@@ -76,69 +75,28 @@ class PictureSource:
         attach: Callable[[str], SharedMemory] | None = None,
         is_stepped: bool = False,
     ) -> None:
+        super().__init__(spec.name, STEPPED_PATIENCE if is_stepped else PATIENCE, attach, is_first_taken=is_stepped)
         self.spec = spec
-        self._is_stepped = is_stepped
-        self._patience = STEPPED_PATIENCE if is_stepped else PATIENCE
-        self._period = period
-        self._attach = attach or SharedMemory.attach
-        self._memory: SharedMemory | None = None
-        self._retry = 0
-        self._last = 0
+        self._is_stepped, self._period = is_stepped, period
         self._due: int | None = None
-
-    @property
-    def size(self) -> int:
-        """Bytes of the memory, 0 while there is none."""
-        return self._memory.size if self._memory else 0
 
     def take(self, now: int) -> tuple[bytes, int] | None:
         """The bytes and the sample time of a picture that is due and was not taken yet."""
-        try:
-            if self._memory is None and not self._found(now):
-                return None
-            assert self._memory is not None
-            with self._memory.lock(self._patience):
-                time = self._memory.sample_time()
-                is_picture = not self._is_stepped or time <= now
-                return (bytes(self._memory.buffer), time) if is_picture and self._is_due(time) else None
-        except SharedMemoryError as error:
-            _log.debug("no picture of '%s': %s", self.spec.name, error)
-            if self._memory is None or not self._memory.is_there:
-                self.close()
-                self._retry = now + RETRY
-            return None
+        return self.poll(now, partial(self._taken, now))
 
-    def skip(self) -> None:
-        """Skip the picture that is there now."""
-        if self._memory is not None:
-            with suppress(SharedMemoryError), self._memory.lock(self._patience):
-                self._last, self._due = self._memory.sample_time(), None
+    def pass_over(self, time: int) -> None:
+        self.last, self._due = time, None
 
-    def close(self) -> None:
-        """Detach from the memory."""
-        if self._memory is not None:
-            self._memory.close()
-            self._memory = None
-
-    def _found(self, now: int) -> bool:
-        if now < self._retry:
-            return False
-        memory = self._attach(self.spec.name)
-        try:
-            with memory.lock(self._patience):
-                self._last, self._due = 0 if self._is_stepped else memory.sample_time(), None
-        except SharedMemoryError:
-            memory.close()
-            raise
-        self._memory = memory
-        return True
+    def _taken(self, now: int, memory: SharedMemory, time: int) -> tuple[bytes, int] | None:
+        is_picture = not self._is_stepped or time <= now
+        return (bytes(memory.buffer), time) if is_picture and self._is_due(time) else None
 
     def _is_due(self, time: int) -> bool:
         """Pictures are taken on a grid of times, a tenth of the period early at most; it starts again after a jump."""
-        if time == self._last:
+        if time == self.last:
             return False
-        jumped = self._due is None or time < self._last or time - self._due > 10 * self._period
-        self._last = time
+        jumped = self._due is None or time < self.last or time - self._due > 10 * self._period
+        self.last = time
         due = time if jumped or self._due is None else self._due
         if time < due - self._period // 10:
             return False

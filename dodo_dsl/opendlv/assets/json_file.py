@@ -6,7 +6,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn, Self
@@ -201,11 +201,6 @@ def unread(entries: Iterable[Node], known: Collection[str], needed: Collection[s
         hint, values = near(key, known), those[0].value
         lacking = [name for name in needed if isinstance(values, dict) and name not in values]
         is_slip = not any(f"'{name}'" in hint for name in lacking)
-        yield of_keys(those, key, f"nothing reads '{key}'", hint or f"known: {', '.join(known)}", is_slip)
-
-
-def of_keys(entries: Sequence[Node], key: str, what: str, hint: str = "", is_slip: bool = True) -> InputError:
-    """The problem of a key that these objects have, at the first."""
-    more = f" (and in {len(entries) - 1} more)" if len(entries) > 1 else ""
-    place = f"{entries[0].place}.{key}"
-    return InputError(entries[0].file, what + more, place, hint=hint, is_slip=is_slip, is_of_key=True)
+        what = f"nothing reads '{key}'" + (f" (and in {len(those) - 1} more)" if len(those) > 1 else "")
+        hint = hint or f"known: {', '.join(known)}"
+        yield InputError(those[0].file, what, f"{those[0].place}.{key}", hint=hint, is_slip=is_slip, is_of_key=True)

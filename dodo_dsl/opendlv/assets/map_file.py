@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from dodo_dsl.opendlv.assets import mesh_text
-from dodo_dsl.opendlv.assets.json_file import MAX_NUMBER, Node, of_keys, read_bytes, unread
+from dodo_dsl.opendlv.assets.json_file import MAX_NUMBER, Node, read_bytes, unread
 from dodo_dsl.opendlv.assets.problem import InputError
 
 MAX_INSTANCES = 100_000
@@ -244,7 +244,6 @@ def problems(path: Path) -> tuple[MapFile | None, list[InputError]]:
     except InputError as error:
         return None, [error]
     found.extend(unread_keys(root))
-    found.extend(_without_effect(root))
     found.extend(_degrees(read, root))
     return read, found
 
@@ -254,28 +253,6 @@ def unread_keys(root: Node) -> Iterator[InputError]:
     yield from unread([root], _KEYS, ("obstacles",))
     for key, known in _KEYS.items():
         yield from unread(_listed(root, key), known, known if key == "obstacles" else ())
-
-
-def _without_effect(root: Node) -> Iterator[InputError]:
-    """Keys of the format that change nothing in an image, each once."""
-    models, blocks = list(_listed(root, "model")), list(_listed(root, "block"))
-    yield from _stamps_twice(models)
-    for entries in (models, blocks):
-        if both := [entry for entry in entries if _has(entry, "color") and _has(entry, "textureFile")]:
-            yield of_keys(both, "color", "'color' is not used beside 'textureFile'", "remove one of them")
-    if sizes := [block for block in blocks if _has(block, "textureSize") and not _has(block, "textureFile")]:
-        yield of_keys(sizes, "textureSize", "'textureSize' is not used without 'textureFile'", "remove it")
-
-
-def _stamps_twice(models: Sequence[Node]) -> Iterator[InputError]:
-    """Models at the frame of a later model: OpenDLV draws the last one."""
-    later: dict[object, Node] = {}
-    for model in reversed(models):
-        stamps = model.value.get("frames") if isinstance(model.value, dict) else None
-        for stamp in stamps if isinstance(stamps, list) else ():
-            if isinstance(stamp, int) and (other := later.setdefault(stamp, model)) is not model:
-                what = f"{other.place} has the frame {stamp}, too: only the last of them is drawn"
-                yield InputError(model.file, what, f"{model.place}.frames", hint="remove one", is_slip=True)
 
 
 def _listed(root: Node, key: str) -> Iterator[Node]:

@@ -88,29 +88,6 @@ def test_a_key_of_many_objects_is_told_once(told: Callable[[str, Any], list[Inpu
     assert found.hint == "did you mean 'lines'?"
 
 
-@pytest.mark.parametrize(
-    ("kind", "more", "said"),
-    [
-        ("model", {"textureFile": "floor.png"}, "color: 'color' is not used beside 'textureFile'"),
-        ("block", {"textureFile": "floor.png"}, "color: 'color' is not used beside 'textureFile'"),
-        ("block", {"textureSize": [1, 1]}, "textureSize: 'textureSize' is not used without 'textureFile'"),
-    ],
-)
-def test_keys_of_the_format_without_effect_are_told(
-    told: Callable[[str, Any], list[InputError]], kind: str, more: dict[str, Any], said: str
-) -> None:
-    found = [e.what for e in told("map", {**MAP, kind: [{**MAP[kind][0], **more}]}) if e.is_slip]
-    assert found == [f"$.{kind}[0].{said}"]
-
-
-def test_a_model_at_the_frame_of_another_is_told(told: Callable[[str, Any], list[InputError]]) -> None:
-    first, second = ({**MAP["model"][0], "frames": frames} for frames in ([0, 1], [2, 1]))
-    (found,) = told("map", {**MAP, "model": [first, second]})
-    assert (found.is_slip, found.what) == (
-        True, "$.model[0].frames: $.model[1] has the frame 1, too: only the last of them is drawn",
-    )  # fmt: skip
-
-
 def test_a_column_that_is_almost_the_field_is_told(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time,value,groundSteerng\n0,1,2\n1,1,2\n")
     given = dict.fromkeys(formats.SETTINGS["target"], "") | {"field": "groundSteering"}
