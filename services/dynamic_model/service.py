@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -99,41 +100,34 @@ def _drive(flags: Flags, condition: Condition) -> Drive | None:
     """The drive of the flags, None for that of the Kiwi car; raises ValueError for a car that cannot be."""
     friction = condition.grip * (flags["friction"] or 0)
     if flags["drive"] == "differential":
-        wheels = TwoWheels(
-            wheel_radius=flags["wheel-radius"],
-            track=flags["track"],
-            top_wheel_speed=flags["top-wheel-speed"],
-            motor_lag=flags["motor-lag"],
-            dead_zone=flags["dead-zone"],
-            axle_offset=flags["axle-offset"],
-            wheel_offset=flags["wheel-offset"],
+        wheels = _of(
+            TwoWheels,
+            flags,
             friction=friction,
-            slip=flags["slip"],
-            max_speed=flags["max-speed"],
             max_yaw_rate=math.radians(flags["max-yaw-rate"]),
             max_acceleration=flags["max-acceleration"] or math.inf,
         )
         return DifferentialDrive(wheels, flags["wheel-input"] == "axle", condition.power)
     if flags["drive"] != "bicycle":
         return None
-    car = SingleTrack(
-        mass=flags["mass"],
-        inertia=flags["inertia"],
-        wheel_base=flags["wheel-base"],
-        cg=flags["cg"],
+    car = _of(
+        SingleTrack,
+        flags,
         cornering_front=flags["cornering-front"] * condition.grip,
         cornering_rear=flags["cornering-rear"] * condition.grip,
         friction=friction,
         max_steering=math.radians(flags["max-steering"]),
         steering_rate=math.radians(flags["steering-rate"]),
-        speed_lag=flags["speed-lag"],
         max_acceleration=flags["max-acceleration"] or _CAR_ACCELERATION,
-        max_braking=flags["max-braking"],
-        top_speed=flags["top-speed"],
-        blend_speed=flags["blend-speed"],
     )
     has_tyres, by_speed = flags["tyres"] == "dynamic", flags["speed-input"] == "speed"
     return BicycleDrive(car, has_tyres, by_speed, condition.power, condition.steering_offset)
+
+
+def _of(car: type[Any], flags: Flags, **others: float) -> Any:
+    """A car by the flags that are named as its parameters, and ``others`` of them."""
+    named = {each.name: flags[each.name.replace("_", "-")] for each in fields(car) if each.name not in others}
+    return car(**named, **others)
 
 
 def build(context: Context) -> Service:
