@@ -10,7 +10,7 @@ from google.protobuf.message import DecodeError
 
 from dodo_dsl.opendlv import odvd, wire
 from dodo_dsl.opendlv.address import HEADER_BYTES, MAGIC, FrameError, body_length
-from dodo_dsl.opendlv.protobuf_classes import Layout, build
+from dodo_dsl.opendlv.protobuf_classes import build
 
 MAX_BODY_BYTES = 2**24 - 1
 MICROSECONDS = 1_000_000
@@ -31,8 +31,8 @@ class Envelope(NamedTuple):
     sender_stamp: int
 
 
-def _envelope_layout() -> Layout:
-    definitions = odvd.parse(
+LAYOUT = build(
+    odvd.parse(
         """
         message cluon.data.TimeStamp [id = 12] { int32 seconds; int32 microseconds; }
         message cluon.data.Envelope [id = 1] {
@@ -41,11 +41,8 @@ def _envelope_layout() -> Layout:
           uint32 senderStamp;
         }"""
     )
-    return build(definitions)["cluon.data.Envelope"]
-
-
-_LAYOUT = _envelope_layout()
-_TYPE: Any = _LAYOUT.type
+)["cluon.data.Envelope"]
+_TYPE: Any = LAYOUT.type
 
 
 def encode_frame(envelope: Envelope) -> bytes:
@@ -103,7 +100,7 @@ def _parsed(body: bytes) -> Any:
     try:
         proto = _TYPE.FromString(body)
         if proto.ByteSize() != len(body):
-            proto = _TYPE.FromString(wire.keep_first(body, _LAYOUT.shape))
+            proto = _TYPE.FromString(wire.keep_first(body, LAYOUT.shape))
     except (DecodeError, wire.WireError) as error:
         raise FrameError(f"the frame holds no envelope: {error}") from None
     return proto

@@ -10,17 +10,15 @@ from numpy.typing import NDArray
 
 from dodo_dsl.opendlv import message_columns, wire
 from dodo_dsl.opendlv.address import HEADER_BYTES, MAGIC, FrameError
-from dodo_dsl.opendlv.envelope import decode_frame, decode_parts, encode_frame
+from dodo_dsl.opendlv.envelope import LAYOUT, decode_frame, decode_parts, encode_frame
 from dodo_dsl.opendlv.message_columns import Marks, Numbers
 
 PADDING = bytes(128)  # what a reader of the last frame may look at beyond it
 FEW = 16
-_MAX_BODY = 1 << 25
-_MAX_UINT32 = 1 << 32
 
 
 class Fact(IntEnum):
-    """The columns; positions are in the data at hand, sizes in bytes, times as in the file."""
+    """The columns, an envelope's in the order of its fields; positions are in the data at hand, times as written."""
 
     START = 0
     END = 1
@@ -37,8 +35,6 @@ class Fact(IntEnum):
 
 
 Table = NDArray[np.int64]  # (len(Fact), frames)
-
-_TIMES = ((0x1A, Fact.SENT_S), (0x22, Fact.RECEIVED_S), (0x2A, Fact.SAMPLED_S))
 
 
 def empty() -> Table:
@@ -81,36 +77,10 @@ def _one_by_one(data: bytes, starts: list[int], ends: list[int], known: bool) ->
 
 def _at_once(data: bytes, starts: Numbers, ends: Numbers) -> tuple[Table, Marks]:
     """All rows, and which of them are as libcluon writes them: every field once and in order."""
-    source, octets = message_columns.fixed_words(data), np.frombuffer(data, np.uint8)
-    table = np.empty((len(Fact), len(starts)), np.int64)
-    table[Fact.START], table[Fact.END] = starts, ends
-    at = starts + HEADER_BYTES
-    usual = octets[at] == 0x08
-    kind, length = message_columns.read_varints(source, at + 1)
-    usual &= (length > 0) & (kind < _MAX_UINT32)
-    table[Fact.DATA_TYPE] = message_columns.signed_varints(kind)
-    at = at + 1 + length
-    usual &= octets[at] == 0x12
-    size, length = message_columns.read_varints(source, at + 1)
-    usual &= (length > 0) & (size < _MAX_BODY)
-    table[Fact.PAYLOAD] = at + 1 + length
-    at = np.minimum(at + 1 + length + np.minimum(size, _MAX_BODY), ends)
-    table[Fact.PAYLOAD_END] = at
-    for tag, fact in _TIMES:
-        inner_end = at + 2 + octets[at + 1]
-        usual &= (octets[at] == tag) & (octets[at + 2] == 0x08)
-        seconds, length = message_columns.read_varints(source, at + 3)
-        at = at + 3 + length
-        usual &= (length > 0) & (seconds < _MAX_UINT32) & (octets[at] == 0x10)
-        micros, length = message_columns.read_varints(source, at + 1)
-        at = at + 1 + length
-        usual &= (length > 0) & (micros < _MAX_UINT32) & (at == inner_end)
-        table[fact], table[fact + 1] = message_columns.signed_varints(seconds), message_columns.signed_varints(micros)
-    usual &= octets[at] == 0x30
-    stamp, length = message_columns.read_varints(source, at + 1)
-    usual &= (length > 0) & (stamp < _MAX_UINT32) & (at + 1 + length == ends)
-    table[Fact.SENDER_STAMP] = stamp
-    return table, usual
+    reader = message_columns.Reader(data, ends)
+    at = reader.message(LAYOUT, starts + HEADER_BYTES)
+    kind, payload, *others = (values for _, _, values in reader.columns)
+    return np.array([starts, ends, kind, *payload, *others], np.int64), reader.usual & (at == ends)
 
 
 def _is_doubtful(data: bytes, start: int, end: int) -> bool:

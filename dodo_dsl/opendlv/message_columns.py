@@ -20,6 +20,8 @@ Bytes = NDArray[np.uint8]
 Words = NDArray[np.uint64]
 Numbers = NDArray[np.int64]
 Marks = NDArray[np.bool_]
+Places = tuple[Numbers, Numbers]
+"""Where bytes begin and end."""
 
 WORD_BYTES = 8
 _STOP_BITS = np.uint64(0x8080808080808080)
@@ -86,30 +88,34 @@ def decode(layout: Layout, data: bytes, starts: Numbers, ends: Numbers) -> tuple
 
     ``data`` has 128 bytes to spare behind the last payload. Rows that could not be decoded hold anything.
     """
-    reader = _Reader(data, ends)
+    reader = Reader(data, ends)
     at = reader.message(layout, starts)
     usual = reader.usual & (at == ends)
     good = usual.copy()
+    columns = [Column(name, type_, _cut(data, values)) for name, type_, values in reader.columns]
     for row in np.flatnonzero(~usual).tolist():
         try:
             message = message_set.decode(layout, data[int(starts[row]) : int(ends[row])])
         except message_set.MessageError:
             continue
         good[row] = True
-        for (_, _, values), value in zip(reader.columns, _values(layout, message), strict=True):
-            values[row] = value
-    return [Column(*column) for column in reader.columns], good
+        for column, value in zip(columns, _values(layout, message), strict=True):
+            column.values[row] = value
+    return columns, good
 
 
 def usual_rows(layout: Layout, data: bytes, starts: Numbers, ends: Numbers) -> Marks:
     """Which payloads are this message as libcluon writes it."""
-    reader = _Reader(data, ends)
+    reader = Reader(data, ends)
     whole: Marks = reader.message(layout, starts) == ends
     return whole & reader.usual
 
 
-class _Reader:
-    """Moves over all payloads field by field; ``usual`` shows which of them still look as libcluon writes them."""
+class Reader:
+    """Moves over all payloads field by field; ``usual`` shows which of them still look as libcluon writes them.
+
+    ``columns`` have name, type and values of each field: an array of numbers, or the Places of bytes and strings.
+    """
 
     def __init__(self, data: bytes, ends: Numbers) -> None:
         self.columns: list[tuple[str, str, Any]] = []
@@ -145,7 +151,7 @@ class _Reader:
             source: NDArray[Any] = np.ndarray((len(self._data) - size + 1,), kind, self._data, strides=(1,))
             return source[at], np.minimum(at + size, self._ends + 1)
         if type_ in ("string", "bytes"):
-            return self._slices(at)
+            return self._places(at)
         value, length = read_varints(self._words, at)
         bits = 1 if type_ == "bool" else INTEGER_BITS[type_]
         self.usual &= length > 0
@@ -159,14 +165,18 @@ class _Reader:
         self.usual &= (length > 0) & (size < _MAX_SIZE) & (at + length <= self._ends)
         return np.minimum(size, _MAX_SIZE), np.minimum(at + length, self._ends)
 
-    def _slices(self, at: Numbers) -> tuple[list[bytes], Numbers]:
+    def _places(self, at: Numbers) -> tuple[Places, Numbers]:
         size, at = self._size(at)
         end = at + size
         self.usual &= end <= self._ends
         end = np.minimum(end, self._ends)
-        data = self._data
-        values = [data[a:b] for a, b in zip(at.tolist(), end.tolist(), strict=True)]
-        return values, end
+        return (at, end), end
+
+
+def _cut(data: bytes, values: Any) -> Any:
+    if not isinstance(values, tuple):
+        return values
+    return [data[begin:end] for begin, end in zip(*(each.tolist() for each in values), strict=True)]
 
 
 def _values(layout: Layout, message: Any) -> Iterator[Any]:
