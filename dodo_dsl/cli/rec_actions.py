@@ -15,13 +15,13 @@ from dodo_dsl.atomic import refuse_existing
 from dodo_dsl.cli.display import progress_bar
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.opendlv import message_versions
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import OdvdError
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec import contents, recording_filter
 from dodo_dsl.rec.contents import contents_text
-from dodo_dsl.rec.frames import IMAGE
 from dodo_dsl.rec.recording_filter import Excerpt, NothingSelected
 from dodo_dsl.spec.deployment import find_deployment, load_deployment
 from dodo_dsl.terminal import json_text, printable

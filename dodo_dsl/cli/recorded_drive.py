@@ -22,13 +22,14 @@ from dodo_dsl.cli.new_files import New, filled, spec_files
 from dodo_dsl.cli.rec_actions import messages_for
 from dodo_dsl.diagnostics import shown_path
 from dodo_dsl.opendlv import recording_times
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.envelope import encode_frame
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import OWN_IDS, MessageError, MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec import contents
 from dodo_dsl.rec.contents import MessageStream
-from dodo_dsl.rec.frames import IMAGE, packets
+from dodo_dsl.rec.frames import packets
 
 SIGNALS = {
     "opendlv.proxy.GroundSteeringRequest": "groundSteering",

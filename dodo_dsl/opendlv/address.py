@@ -14,6 +14,8 @@ RECEIVE_BUFFER = 26_214_400
 """Bytes that a session's socket may hold; libcluon requests as many."""
 OF_THE_WORLD = ("opendlv.sim.", "dodo.", "cluon.data.")
 """So begin the names of messages that only a simulation has, and those who control it: no bus of a car carries them."""
+IMAGE = 1055
+"""The id of opendlv.proxy.ImageReading, in which recordings have the frames of cameras."""
 POSE = ("opendlv.sim.Frame", "opendlv.sim.KinematicState")
 """Those that carry where the vehicle truly is, or how it moves."""
 

@@ -71,7 +71,8 @@ def tokens(text: str, file: str) -> Iterator[Token]:
 
 
 INTEGER_BITS = {"char": 8} | {f"{kind}{bits}": bits for bits in (8, 16, 32, 64) for kind in ("uint", "int")}
-SCALARS = frozenset(INTEGER_BITS) | {"bool", "float", "double", "string", "bytes"}
+NUMBERS = frozenset(INTEGER_BITS) | {"bool", "float", "double"}
+SCALARS = NUMBERS | {"string", "bytes"}
 
 Default = bool | int | float | str | None
 
@@ -127,6 +128,11 @@ class Definition:
     package: str
     fields: tuple[Field, ...]
     place: TextPlace
+
+    @property
+    def numbers(self) -> dict[str, bool]:
+        """The fields that are numbers, each with whether it is a float and not a double."""
+        return {each.name: each.type == "float" for each in self.fields if each.type in NUMBERS}
 
     def same_layout(self, other: "Definition") -> bool:
         """Whether both describe the same name, id and fields, wherever they are defined."""

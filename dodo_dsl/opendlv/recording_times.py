@@ -5,12 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.message_columns import Marks, Numbers
 from dodo_dsl.opendlv.message_set import OWN_IDS, MessageSet
 from dodo_dsl.opendlv.recording import Recording
 
 DAY = 86_400_000_000
-IMAGE = 1055
 MOST_BACK = 1_000_000
 """Microseconds that a message may lie before the one before it of the same sender; images must be in order."""
 TOOLS = range(1, 13)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError
@@ -17,7 +18,7 @@ from dodo_dsl.opendlv.ros_types import COMPRESSED, DETECTIONS, CameraView, Topic
 from dodo_dsl.opendlv.ros_types import IMAGE as IMAGE_TYPE
 from dodo_dsl.opendlv.video import CODECS, VideoDecoder, VideoError
 from dodo_dsl.rec.bag import WRITTEN, Key
-from dodo_dsl.rec.frames import IMAGE, decoder_of, packet_of, packets
+from dodo_dsl.rec.frames import decoder_of, packet_of, packets
 
 
 @dataclass

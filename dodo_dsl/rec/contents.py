@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from dodo_dsl.opendlv import recording_times
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.rec.frames import IMAGE, decoded
+from dodo_dsl.rec.frames import decoded
 
 
 @dataclass(frozen=True)

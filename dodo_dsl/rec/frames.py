@@ -4,13 +4,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.video import DecodedFrame, VideoDecoder, VideoError, refuse_large
 
-IMAGE = 1055
 MOST_DECODERS = 16
 _JPEG_QUALITY = 95
 

@@ -21,12 +21,12 @@ from typing import Any, Protocol
 import cv2
 import numpy as np
 
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.picture_size import problem_of, too_large
 from services.camera.picture import CameraError, Image, SharedPicture, from_bgr, from_i420
 
 MAX_BYTES = 64 << 20
 RECORDING = ".rec"
-IMAGE_READING = 1055
 _SIDES = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
 
 
@@ -105,9 +105,9 @@ def recorded(path: Path) -> Iterator[Image]:
 
     messages, decoder, sender = MessageSet.standard(), None, None
     for envelope in reader.read_envelopes(path):
-        sender = envelope.sender_stamp if sender is None and envelope.data_type == IMAGE_READING else sender
-        if (envelope.data_type, envelope.sender_stamp) == (IMAGE_READING, sender):
-            reading = messages.decode(IMAGE_READING, envelope.payload)
+        sender = envelope.sender_stamp if sender is None and envelope.data_type == IMAGE else sender
+        if (envelope.data_type, envelope.sender_stamp) == (IMAGE, sender):
+            reading = messages.decode(IMAGE, envelope.payload)
             video.refuse_large(reading.width, reading.height)
             decoder = decoder or video.VideoDecoder(reading.format)
             frame = decoder.decode(reading.data)

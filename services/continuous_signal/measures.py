@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.envelope import MICROSECONDS
+from dodo_dsl.opendlv.recording_times import DAY
 from services.base import Check
 from services.base.evaluator import EARLY, Hidden
 from services.base.service import at_limit
 from services.continuous_signal.target import Target, Times, Values
-
-DAY = 86_400 * MICROSECONDS
 
 
 @dataclass(frozen=True)

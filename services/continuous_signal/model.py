@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.envelope import MICROSECONDS
+from dodo_dsl.opendlv.recording_times import DAY
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.base.evaluator import EARLY, Hidden
 from services.base.judged import FAILED, MOST_SAMPLES, WARNED
 from services.base.service import said
 from services.continuous_signal.measures import (
-    DAY,
     Coverage,
     LateFacts,
     LateSamples,

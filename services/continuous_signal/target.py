@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from google.protobuf.descriptor import FieldDescriptor
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv import recording_times
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.assets.table import read_target
 from dodo_dsl.opendlv.envelope import MICROSECONDS, Envelope
@@ -68,9 +68,6 @@ def read_table(path: Path, field: str, from_first: bool) -> Target:
     return Target(times - start, np.array([value for _, value in samples]), start)
 
 
-_NO_NUMBERS = (FieldDescriptor.CPPTYPE_STRING, FieldDescriptor.CPPTYPE_MESSAGE)
-
-
 @dataclass(frozen=True)
 class Signal:
     """A number in a message: the message's full name, its sender stamp, and the field."""
@@ -89,21 +86,20 @@ class Signal:
 
 def check(signal: Signal, messages: MessageSet) -> Signal:
     """The signal itself; raises UnknownMessage, and ValueError for a field that is unknown or not a number."""
-    fields = {field.name: field for field in messages.type(signal.message).DESCRIPTOR.fields}
-    field = fields.get(signal.field)
-    if field is None:
+    definition = messages.layout(signal.message).definition
+    fields = [field.name for field in definition.fields]
+    if signal.field not in fields:
         close = difflib.get_close_matches(signal.field, fields, n=1)
         hint = f"did you mean '{close[0]}'?" if close else f"it has {', '.join(fields) or 'none'}"
         raise ValueError(f"{signal.message} has no field '{signal.field}'; {hint}")
-    if field.cpp_type in _NO_NUMBERS:
+    if signal.field not in definition.numbers:
         raise ValueError(f"the field {signal.field} of {signal.message} is not a number")
     return signal
 
 
 def is_single(signal: Signal, messages: MessageSet) -> bool:
     """Whether the field of a checked signal is a float, not a double."""
-    field = messages.type(signal.message).DESCRIPTOR.fields_by_name[signal.field]
-    return bool(field.cpp_type == FieldDescriptor.CPPTYPE_FLOAT)
+    return messages.layout(signal.message).definition.numbers[signal.field]
 
 
 def read_recording(path: Path, signal: Signal, messages: MessageSet) -> Target:
@@ -134,9 +130,7 @@ def read_recording(path: Path, signal: Signal, messages: MessageSet) -> Target:
 def picture_times(path: Path, sender: int, start: int) -> Times | None:
     """When the pictures of a camera in a ``.rec`` file were taken, in us from ``start``; None if it has none."""
     with Recording(path) as recording:
-        times: Times = np.unique(
-            recording.index["time"][recording.rows([recording_times.IMAGE], sender_stamps=[sender])]
-        )
+        times: Times = np.unique(recording.index["time"][recording.rows([IMAGE], sender_stamps=[sender])])
     return times - start if len(times) else None
 
 
@@ -144,7 +138,7 @@ def due_times(path: Path, sender: int, start: float, end: float | None, timemod:
     """When a player shows the pictures of a camera in a recording, in us from its start, with gaps of 1 s at most."""
     with Recording(path) as recording:
         rows, _, due = recording_times.played(recording, start, end, MICROSECONDS, timemod)
-        return due[np.isin(rows, recording.rows([recording_times.IMAGE], sender_stamps=[sender]))]
+        return due[np.isin(rows, recording.rows([IMAGE], sender_stamps=[sender]))]
 
 
 def _values(path: Path, envelopes: list[Envelope], signal: Signal, messages: MessageSet) -> Values:

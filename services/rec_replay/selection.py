@@ -10,11 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from dodo_dsl.opendlv import recording_times
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.message_columns import Marks, Numbers
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet, UnknownMessage
 from dodo_dsl.opendlv.recording import Recording, matching
-
-IMAGE = 1055
 
 
 class SelectionError(ValueError):

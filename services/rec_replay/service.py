@@ -11,6 +11,7 @@ import numpy as np
 from google.protobuf.message import Message
 
 from dodo_dsl.opendlv import message_versions, pixels
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.envelope import MICROSECONDS
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import Recording
@@ -19,7 +20,7 @@ from services.base import Context, Service
 from services.base.loop import TEST_BEGIN
 from services.base.pictures import memories
 from services.base.service import Framed, Output, period_of
-from services.rec_replay.selection import IMAGE, Part, Player, Selection, SelectionError, select
+from services.rec_replay.selection import Part, Player, Selection, SelectionError, select
 from services.rec_replay.stream import EntryStream, PictureMemories, first_frame
 
 LOOKS_HZ = 1000.0

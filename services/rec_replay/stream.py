@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.frame_table import Fact
 from dodo_dsl.opendlv.message_columns import Numbers
@@ -14,7 +15,7 @@ from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.video import DecodedFrame, VideoDecoder, VideoError, has_key_frame, refuse_large
 from services.base.pictures import Memories, show
-from services.rec_replay.selection import IMAGE, Part
+from services.rec_replay.selection import Part
 
 FARTHEST = 3000
 """Pictures that are searched for a key frame before a place in the recording."""

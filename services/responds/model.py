@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv import recording_times
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.recording import Recording
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.base.clock import MICROSECONDS
@@ -69,7 +70,7 @@ def of_recording(path: Path, part: PlayedPart) -> Frames:
     with Recording(path) as recording:
         max_gap = round(part.max_gap * MICROSECONDS)
         rows, times, due = recording_times.played(recording, part.start, part.end, max_gap, part.timemod)
-        shown = np.isin(rows, recording.rows([recording_times.IMAGE], sender_stamps=[part.sender]))
+        shown = np.isin(rows, recording.rows([IMAGE], sender_stamps=[part.sender]))
     if not shown.any():
         raise ValueError(f"{path}: has no pictures of sender {part.sender} in the part that is played")
     return Frames(due[shown], None if part.is_test_time else times[shown])

@@ -4,14 +4,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from google.protobuf.descriptor import FieldDescriptor
-
 from services.base import Context, Flags
 from services.base.clock import MICROSECONDS
 from services.base.service import SINGLE
 from services.responds.model import Frames, PlayedPart, ResponseEvaluator, ResponseLimits, at_rate, of_recording
-
-_NO_NUMBERS = (FieldDescriptor.CPPTYPE_STRING, FieldDescriptor.CPPTYPE_MESSAGE)
 
 
 class Responds(ResponseEvaluator):
@@ -20,10 +16,13 @@ class Responds(ResponseEvaluator):
     def __init__(self, context: Context) -> None:
         """Raises ValueError for flags that leave something open."""
         flags = context.flags
-        self._fields = _numbers(context)
-        name = f"{flags['message']}/{flags['sender']}"
-        limits = replace(_limits(flags), exact=SINGLE if _is_single(context) else 0.0)
-        super().__init__(name, flags["field"] or "", _frames(flags), limits, flags["max-time"])
+        message, field = flags["message"], flags["field"] or ""
+        numbers = context.messages.layout(message).definition.numbers
+        if field and field not in numbers:
+            raise ValueError(f"{message} has no number '{field}', expected one of {', '.join(numbers) or 'none'}")
+        self._fields = [field] if field else [*numbers]
+        limits = replace(_limits(flags), exact=SINGLE if numbers.get(field) else 0.0)
+        super().__init__(f"{message}/{flags['sender']}", field, _frames(flags), limits, flags["max-time"])
         self.inputs = {(flags["message"], flags["sender"]): self._take}
 
     def _take(self, message: Any, sample_time: int) -> None:
@@ -33,22 +32,6 @@ class Responds(ResponseEvaluator):
 def build(context: Context) -> Responds:
     """The service from its flags; raises ValueError for flags that leave something open."""
     return Responds(context)
-
-
-def _numbers(context: Context) -> list[str]:
-    """The field with bounds, or else all fields that are numbers."""
-    message, field = context.flags["message"], context.flags["field"]
-    fields = context.messages.type(message).DESCRIPTOR.fields
-    numbers = [each.name for each in fields if each.cpp_type not in _NO_NUMBERS and not each.is_repeated]
-    if field and field not in numbers:
-        raise ValueError(f"{message} has no number '{field}', expected one of {', '.join(numbers) or 'none'}")
-    return [field] if field else numbers
-
-
-def _is_single(context: Context) -> bool:
-    """Whether the field with bounds is a float, not a double."""
-    fields, field = context.messages.type(context.flags["message"]).DESCRIPTOR.fields_by_name, context.flags["field"]
-    return bool(field) and fields[field].cpp_type == FieldDescriptor.CPPTYPE_FLOAT
 
 
 def _frames(flags: Flags) -> Frames:

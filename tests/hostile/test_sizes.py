@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.assets import map_file
 from dodo_dsl.opendlv.assets.map_file import MAX_OVERLAYS, read_map
 from dodo_dsl.opendlv.assets.mesh_text import MAX_BYTES, MAX_TRIANGLES, MAX_VERTICES
@@ -21,7 +22,7 @@ from dodo_dsl.opendlv.odvd import OdvdError
 from dodo_dsl.opendlv.picture_size import MAX_PIXELS
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec import truth
-from dodo_dsl.rec.frames import IMAGE, MOST_DECODERS, decoded
+from dodo_dsl.rec.frames import MOST_DECODERS, decoded
 from dodo_dsl.rec.truth import TruthError
 from dodo_dsl.run.protocol import Flooded, Noted
 from dodo_dsl.run.run_state import MOST_NOTES, RunState

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.assets import map_file, mesh_text
 from dodo_dsl.opendlv.assets.json_file import read_bytes
 from dodo_dsl.opendlv.assets.problem import InputError
@@ -23,7 +24,7 @@ Format = Callable[[Path, Settings, Ids], Iterator[InputError]]
 RECORDING = ".rec"
 PICTURES = (".png", ".jpg", ".jpeg")
 _BOXES = "$.annotations"
-_IMAGE, _IMAGE_NAME = 1055, "pictures"
+_IMAGE_NAME = "pictures"
 _POINTER = b"version https://git-lfs"
 
 
@@ -147,7 +148,7 @@ def _car(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
 
 def _recording(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
     sender = settings["video-sender"] if settings["video"] == "true" else ""
-    wanted = (_IMAGE, int(sender)) if sender.isdecimal() else (-1, 0)
+    wanted = (IMAGE, int(sender)) if sender.isdecimal() else (-1, 0)
     yield from _contents(path, *wanted, _IMAGE_NAME, is_needed=False)
 
 

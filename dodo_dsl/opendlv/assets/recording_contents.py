@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.assets.problem import InputError
 
 if TYPE_CHECKING:
     from dodo_dsl.opendlv.recording import Recording
 
 MOST_BYTES = 64 << 20
-_IMAGE = 1055
 _HINT = "expected an OpenDLV recording (.rec), as cluon-rec and rec-recorder write it"
 
 
@@ -71,9 +71,9 @@ def _contents(path: Path, _changed_ns: int) -> Contents:
 def _picture(recording: "Recording") -> tuple[int, int]:
     from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 
-    for row in recording.rows([_IMAGE])[:1].tolist():
+    for row in recording.rows([IMAGE])[:1].tolist():
         try:
-            image = MessageSet.standard().decode(_IMAGE, recording.envelope(row).payload)
+            image = MessageSet.standard().decode(IMAGE, recording.envelope(row).payload)
         except MessageError:
             break
         return image.width, image.height

@@ -41,7 +41,7 @@ def test_the_vehicle_stands_where_its_flags_say(cube_at: Callable[..., Path], tm
     ("words", "sentence"),
     [
         (("--truth-classes=cone=x",), "there is no model 'cone' in the map"),
-        (("--fovi=3",), "did you mean '--fovy'"),
+        (("--fovi=3",), "--fovi=3"),
         (("--output=again.png",), "expected --output=FILE once"),
     ],
 )
