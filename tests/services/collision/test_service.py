@@ -154,7 +154,6 @@ def test_slow_frames_and_a_single_one_are_waited_for(lane: Path) -> None:
         ({"requests": []}, "--requests is empty: a drive is the application's only if it sends something"),
         ({"requests": ["opendlv.proxy.PedalPositionRequest/x"]}, "Request/x' has no whole number as its sender stamp"),
         ({"goal": "finnish"}, "has no obstacle 'finnish'; did you mean 'finish'?"),
-        ({"min-body-margin": 0.1}, "--min-body-margin needs --bodies"),
         ({"bodies": True}, "--bodies: no model of the map has 'frames' of other sender stamps than the vehicle's"),
     ],
 )
