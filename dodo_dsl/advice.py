@@ -21,7 +21,7 @@ from dodo_dsl import package_data
 _LOADED = {
     "mcap": ("mcap.writer", "mcap_protobuf.schema", "foxglove_schemas_protobuf"),
     "ros": ("rosbags.rosbag2", "cyclonedds.core"),
-    "search": ("scipy",),
+    "search": ("optuna", "scipy"),
     "storage": ("psycopg",),
 }
 """Modules of what each extra of DoDo installs, which load what they need themselves."""

@@ -23,8 +23,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # this checkout
 
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.search.search_loop import SamplingOrder, key
-from dodo_dsl.search.space import Space, texts
+from dodo_dsl.search.space import Space, course, texts
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.vary import Range
 
@@ -80,12 +79,8 @@ def space_of(bug: Bug) -> Space:
 
 def searched(bug: Bug, seed: int) -> Iterator[float]:
     """The margins of the drives of a search."""
-    margins: dict[tuple[str, ...], float | None] = {}
-    for batch in SamplingOrder(space_of(bug), 1 << 10, seed).generations(margins):
-        for one in batch:
-            margin = bug.margin([float(text) for text in texts(one.values).values()])
-            margins[key(one.values)] = margin
-            yield margin
+    for one in course(space_of(bug), 1 << 10, seed):
+        yield bug.margin([float(text) for text in texts(one.values).values()])
 
 
 def at_random(bug: Bug, seed: int) -> Iterator[float]:

@@ -1,7 +1,7 @@
 """How many drives find the bugs of bugs.py, by margins that real drives of the good program had.
 
     python benchmarks/planted/programs.py none --most 300
-    python benchmarks/planted/measured.py [--drives build/planted/none-0/dodo-report/search/planted/search.sqlite]
+    python benchmarks/planted/measured.py [--drives build/planted/none-0/dodo-report/search/planted/search.journal]
 
 A drive in a bug's corner fails; elsewhere its margin is interpolated between the measured ones. So many seeds, uniform
 random drives and VerifAI's sampler are compared without thousands of drives. What a bug with an onset changes outside
@@ -9,7 +9,6 @@ its corner is left out, which makes it harder to find than programs.py does.
 """
 
 import json
-import sqlite3
 import statistics
 import sys
 from collections.abc import Callable
@@ -18,6 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import optuna
+from optuna.storages import JournalStorage
+from optuna.storages.journal import JournalFileBackend
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
@@ -27,7 +29,7 @@ from functions import FAILED, Bug, options, print_table  # noqa: E402
 from programs import ROOT  # noqa: E402
 
 NAMES = list(RANGES)
-STORE = ROOT / "build/planted/none-0/dodo-report/search/planted/search.sqlite"
+STORE = ROOT / "build/planted/none-0/dodo-report/search/planted/search.journal"
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,9 @@ class Measured(Bug):
 
 def measured(store: Path) -> tuple[Any, Any]:
     """Points, as shares of the ranges in the order of NAMES, and margins of the drives in a search's file."""
-    with sqlite3.connect(f"file:{store}?mode=ro", uri=True) as database:
-        rows = database.execute("select point, margin from drives where margin is not null").fetchall()
+    name = "planted main"
+    trials = optuna.load_study(study_name=name, storage=JournalStorage(JournalFileBackend(str(store)))).trials
+    rows = [(one.user_attrs["point"], one.value) for one in trials if one.value is not None]
     points = []
     for text, _ in rows:
         values = {name.upper(): float(value.rstrip(UNITS)) for name, value in json.loads(text).items()}

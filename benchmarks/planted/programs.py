@@ -13,7 +13,6 @@ import json
 import re
 import shutil
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
@@ -76,12 +75,10 @@ def again(folder: Path, spec: str, reason: str) -> str:
 
 def kept(folder: Path) -> list[tuple[int, str]]:
     """Numbers and outcomes of the drives that a search has kept so far, in order."""
-    store = folder / "dodo-report" / "search" / "planted" / "search.sqlite"
-    try:
-        with sqlite3.connect(f"file:{store}?mode=ro", uri=True) as database:
-            return database.execute("select number, outcome from drives order by number").fetchall()
-    except sqlite3.OperationalError:  # not there yet
-        return []
+    store = folder / "dodo-report" / "search" / "planted" / "search.journal"
+    lines = [json.loads(line) for line in store.read_text().splitlines()] if store.exists() else []
+    drives = [line["user_attr"]["drive"] for line in lines if "drive" in line.get("user_attr", ())]
+    return sorted((drive["number"], drive["outcome"]) for drive in drives)
 
 
 def first_of(bug: str, work: Path, seed: int, most: int) -> str:

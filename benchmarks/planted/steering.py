@@ -18,7 +18,7 @@ def shares() -> dict[str, float]:
 def main() -> int:
     if bug := bugs.BUGS.get(os.environ["BUG"]):
         change, drive = bug.driving(shares()), driver.Driver.drive
-        driver.Driver.drive = lambda self, yellow, blue: change(*drive(self, yellow, blue))  # type: ignore[method-assign]
+        driver.Driver.drive = lambda self, *cones: change(*drive(self, *cones))  # type: ignore[method-assign]
     return driver.main()
 
 

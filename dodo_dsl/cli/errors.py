@@ -115,6 +115,6 @@ def _machine_errors() -> tuple[type[Exception], ...]:
     from dodo_dsl.images.build_context import WheelsError
     from dodo_dsl.images.docker_command import DockerError
     from dodo_dsl.run.protocol import BackendError
-    from dodo_dsl.search.postgres import StorageProblem
+    from dodo_dsl.search.store import StorageProblem
 
     return DockerError, WheelsError, BackendError, StorageProblem

@@ -34,7 +34,6 @@ COMMANDS = {
     "report": Subcommand("report", "draw reports again, join them into one, and show what changed"),
     "judge": Subcommand("judge", "judge the recording of a test again, also by other limits"),
     "rank": Subcommand("rank", "rank applications by the goals of their tests"),
-    "stats": Subcommand("stats", "show how many services the tests share"),
     "rec": Subcommand("rec", "inspect, cut, export and import recordings"),
     "lsp": Subcommand("lsp", "check tests in an editor whenever one is saved"),
     "completion": Subcommand(
@@ -73,7 +72,7 @@ class Arguments(argparse.ArgumentParser):
         return found, unknown
 
     def error(self, message: str) -> NoReturn:
-        from dodo_dsl.search.postgres import masked
+        from dodo_dsl.search.store import masked
 
         super().error(masked(message))
 
@@ -153,7 +152,7 @@ def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Exit.OK
     except Exception as error:
-        from dodo_dsl.search.postgres import masked
+        from dodo_dsl.search.store import masked
 
         code = exit_code(error)
         if code is not None:

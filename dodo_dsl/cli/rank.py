@@ -8,8 +8,8 @@ import argparse
 import math
 import re
 import statistics
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -17,7 +17,6 @@ from markupsafe import Markup
 
 from dodo_dsl import __version__
 from dodo_dsl.cli.errors import Exit, UsageError
-from dodo_dsl.cli.stats import student_t_quantile
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import results
 from dodo_dsl.report.overview import environment, source_hash, style
@@ -52,25 +51,59 @@ class TestScore:
 
 @dataclass(frozen=True)
 class TeamScore:
-    """A team with its tests by name, all those that any team ran.
-
-    ``interval`` is that of the score, None if a test has fewer than two judged runs.
-    """
+    """A team with its tests by name, all those that any team ran; no ``interval`` without two judged runs of each."""
 
     name: str
     tests: Mapping[str, TestScore]
-    score: float
-    interval: tuple[float, float] | None
-    failure_rate: float
-    """Mean over the tests."""
+    place: int = 0
+    """Teams without a difference share one."""
+
+    @property
+    def score(self) -> float:
+        return statistics.fmean(test.mean for test in self.tests.values())
+
+    @property
+    def failure_rate(self) -> float:
+        """Mean over the tests."""
+        return statistics.fmean(test.failure_rate for test in self.tests.values())
+
+    @property
+    def order(self) -> tuple[float, float]:
+        """Fewer failures first, and among equal ones the higher score."""
+        return round(self.failure_rate, _DIGITS), -round(self.score, _DIGITS)
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """By Student's t for a mean of means, degrees of freedom after Welch and Satterthwaite, rounded down."""
+        tests = self.tests.values()
+        if any(len(test.scores) < 2 for test in tests):
+            return None
+        variances = [statistics.variance(test.scores) / len(test.scores) / len(tests) ** 2 for test in tests]
+        total = sum(variances)
+        if total == 0:
+            return self.score, self.score
+        spread = sum((v / total) ** 2 / (len(t.scores) - 1) for v, t in zip(variances, tests, strict=True))
+        wide = students_t(max(1, math.floor(1 / spread + 1e-9))) * math.sqrt(total)
+        return max(0.0, self.score - wide), min(1.0, self.score + wide)
 
 
-@dataclass(frozen=True)
-class Ranked:
-    """A team with its place; teams without a difference share one."""
+def students_t(freedom: int) -> float:
+    """What half of LEVEL lies below and above 0, by bisection.
 
-    place: int
-    team: TeamScore
+    After Abramowitz and Stegun, Handbook of Mathematical Functions, 26.7.3 and 26.7.4.
+    """
+    low, high = 0.0, 13.0
+    while (middle := (low + high) / 2) not in (low, high):
+        angle = math.atan(middle / math.sqrt(freedom))
+        is_odd = freedom % 2
+        term, total = math.cos(angle) if is_odd else 1.0, 0.0
+        for step in range(2 + is_odd, freedom + 1, 2):
+            total += term
+            term *= math.cos(angle) ** 2 * (step - 1) / step
+        share = math.sin(angle) * total
+        share = 2 / math.pi * (angle + share) if is_odd else share
+        low, high = (middle, high) if share < LEVEL else (low, middle)
+    return low
 
 
 def test_name(outcome: Outcome) -> str:
@@ -93,46 +126,22 @@ def _goal_score(goal: Goal, outcome: Outcome) -> float:
     return min((goal.score(c["value"]) for c in outcome.checks if c["name"] == goal.check), default=0.0)
 
 
-def rank(results: Mapping[str, Sequence[Outcome]]) -> list[Ranked]:
-    """Teams by their names, best first: fewer failures first, and among equal ones the higher score."""
+def rank(results: Mapping[str, Sequence[Outcome]]) -> list[TeamScore]:
+    """Teams by their names, best first."""
     names = sorted({test_name(outcome) for outcomes in results.values() for outcome in outcomes})
-    teams = [_team(name, outcomes, names) for name, outcomes in results.items()]
-    teams.sort(key=lambda team: (*_key(team), team.name))
-    keys = [_key(team) for team in teams]
-    return [Ranked(keys.index(_key(team)) + 1, team) for team in teams]
-
-
-def _key(team: TeamScore) -> tuple[float, float]:
-    return round(team.failure_rate, _DIGITS), -round(team.score, _DIGITS)
-
-
-def _team(name: str, outcomes: Iterable[Outcome], names: Sequence[str]) -> TeamScore:
-    runs: dict[str, list[Outcome]] = {test: [] for test in names}
-    for outcome in outcomes:
-        runs[test_name(outcome)].append(outcome)
-    tests = {test: _test(each) for test, each in runs.items()}
-    score = statistics.fmean(test.mean for test in tests.values())
-    failures = statistics.fmean(test.failure_rate for test in tests.values())
-    return TeamScore(name, tests, score, _interval(score, list(tests.values())), failures)
+    teams = []
+    for name, outcomes in results.items():
+        runs = {test: [outcome for outcome in outcomes if test_name(outcome) == test] for test in names}
+        teams.append(TeamScore(name, {test: _test(each) for test, each in runs.items()}))
+    teams.sort(key=lambda team: (*team.order, team.name))
+    orders = [team.order for team in teams]
+    return [replace(team, place=orders.index(team.order) + 1) for team in teams]
 
 
 def _test(runs: Sequence[Outcome]) -> TestScore:
     judged = [run for run in runs if run.outcome != "error"]
     failed = sum(run.outcome == "failed" for run in judged)
     return TestScore(tuple(map(run_score, judged)), failed, len(runs) - len(judged))
-
-
-def _interval(score: float, tests: Sequence[TestScore]) -> tuple[float, float] | None:
-    """By Student's t for a mean of means, degrees of freedom after Welch and Satterthwaite, rounded down."""
-    if any(len(test.scores) < 2 for test in tests):
-        return None
-    variances = [statistics.variance(test.scores) / len(test.scores) / len(tests) ** 2 for test in tests]
-    total = sum(variances)
-    if total == 0:
-        return score, score
-    spread = sum((v / total) ** 2 / (len(t.scores) - 1) for v, t in zip(variances, tests, strict=True))
-    wide = student_t_quantile((1 + LEVEL) / 2, max(1, math.floor(1 / spread + 1e-9))) * math.sqrt(total)
-    return max(0.0, score - wide), min(1.0, score + wide)
 
 
 VERSION = 1
@@ -143,61 +152,45 @@ METHOD = (
 HEAD = ("rank", "team", "score", "95 % interval", "failed", "no answer", "runs")
 
 
-def as_text(ranking: Sequence[Ranked]) -> str:
+def as_text(ranking: Sequence[TeamScore]) -> str:
     """A table, and how it is made."""
-    rows = [HEAD, *(cells(each) for each in ranking)]
+    rows = [HEAD, *map(cells, ranking)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD))]
     lines = ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in rows]
     return "\n".join([*lines, "", METHOD]) + "\n"
 
 
-def as_markdown(ranking: Sequence[Ranked]) -> str:
+def as_markdown(ranking: Sequence[TeamScore]) -> str:
     """The same table for a page."""
-    rows = [HEAD, ("---",) * len(HEAD), *(tuple(map(_escaped, cells(each))) for each in ranking)]
+    rows = [HEAD, ("---",) * len(HEAD), *(map(_escaped, cells(team)) for team in ranking)]
     return "\n".join([*(f"| {' | '.join(row)} |" for row in rows), "", METHOD]) + "\n"
 
 
-def as_json(ranking: Sequence[Ranked]) -> str:
+def as_json(ranking: Sequence[TeamScore]) -> str:
     """All scores, run by run."""
-    document = {
-        "dodo": "ranking",
-        "version": VERSION,
-        "level": LEVEL,
-        "method": METHOD,
-        "teams": [_document(each) for each in ranking],
-    }
-    return json_text(document)
+    teams = list(map(_document, ranking))
+    return json_text({"dodo": "ranking", "version": VERSION, "level": LEVEL, "method": METHOD, "teams": teams})
 
 
-def _document(ranked: Ranked) -> dict[str, Any]:
-    team = ranked.team
+def _document(team: TeamScore) -> dict[str, Any]:
     tests = {
         name: {"score": test.mean, "runs": test.scores, "failed": test.failed, "errors": test.errors}
         for name, test in team.tests.items()
     }
-    return {
-        "rank": ranked.place,
-        "team": team.name,
-        "score": team.score,
-        "interval": team.interval,
-        "failure_rate": team.failure_rate,
-        "tests": tests,
-    }
+    about = {"rank": team.place, "team": team.name, "score": team.score, "interval": team.interval}
+    return about | {"failure_rate": team.failure_rate, "tests": tests}
 
 
-def cells(ranked: Ranked) -> tuple[str, ...]:
+def cells(team: TeamScore) -> tuple[str, ...]:
     """What a table says of a team, under HEAD."""
-    team = ranked.team
     interval = "single runs" if team.interval is None else f"{team.interval[0]:.3f} to {team.interval[1]:.3f}"
     tests = team.tests.values()
     runs = sum(len(test.scores) + test.errors for test in tests)
     failed = f"{sum(test.failed > 0 for test in tests)} of {len(tests)}"
-    return str(ranked.place), printable(team.name), f"{team.score:.3f}", interval, failed, _unanswered(team), str(runs)
-
-
-def _unanswered(team: TeamScore) -> str:
-    """The number of tests without a judged run."""
-    return str(sum(not test.scores for test in team.tests.values()))
+    unanswered = sum(not test.scores for test in tests)
+    return (
+        str(team.place), printable(team.name), f"{team.score:.3f}", interval, failed, str(unanswered), str(runs)
+    )  # fmt: skip
 
 
 def _escaped(cell: str) -> str:
@@ -266,48 +259,18 @@ samples of the ranges of the tests (dodo run --samples).
 """
 
 
-def _as_html(ranking: Sequence[Ranked]) -> str:
-    pass
-
-    return as_page(ranking)
-
-
-FORMATS = {"text": as_text, "markdown": as_markdown, "json": as_json, "html": _as_html}
-
-
-def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("results", nargs="+", metavar="RESULTS", help="results.json or its folder, or NAME=FILE")
-    parser.add_argument("--format", choices=tuple(FORMATS), default="text", help="format of the table (default: text)")
-
-
-def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    stdout.write(FORMATS[options.format](rank(load_teams(options.results))))
-    return Exit.OK
-
-
 _WIDE, _HIGH = 180, 16
 """px of a bar from 0 to 1."""
 
 
-def as_page(ranking: Sequence[Ranked]) -> str:
+def as_page(ranking: Sequence[TeamScore]) -> str:
     """The table, and the mean score of each test."""
     look = style()
-    return (
-        environment()
-        .get_template("report/ranking.html.j2")
-        .render(
-            ranking=ranking,
-            tests=list(ranking[0].team.tests) if ranking else [],
-            head=HEAD,
-            cells=cells,
-            bar=bar,
-            in_words=in_words,
-            method=METHOD,
-            version=__version__,
-            style=look,
-            hash=source_hash,
-        )
-    )
+    page = environment().get_template("report/ranking.html.j2")
+    return page.render(
+        ranking=ranking, head=HEAD, cells=cells, bar=bar, in_words=in_words, method=METHOD, version=__version__,
+        style=look, hash=source_hash,
+    )  # fmt: skip
 
 
 def in_words(test: TestScore) -> str:
@@ -331,3 +294,16 @@ def bar(team: TeamScore) -> Markup:
         f'<rect width="{_WIDE}" height="{_HIGH}" fill="none" stroke="var(--line)"/>'
         f'<rect width="{_WIDE * team.score:.1f}" height="{_HIGH}" fill="{colour}" opacity="0.5"/>{line}</svg>'
     )
+
+
+FORMATS = {"text": as_text, "markdown": as_markdown, "json": as_json, "html": as_page}
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("results", nargs="+", metavar="RESULTS", help="results.json or its folder, or NAME=FILE")
+    parser.add_argument("--format", choices=tuple(FORMATS), default="text", help="format of the table (default: text)")
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    stdout.write(FORMATS[options.format](rank(load_teams(options.results))))
+    return Exit.OK

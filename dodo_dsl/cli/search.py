@@ -2,7 +2,6 @@
 
 import argparse
 import time
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
@@ -14,11 +13,9 @@ from dodo_dsl.cli.numbers import minutes, positive, seed
 from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.search_session import INTERRUPTED, SearchSession, session
 from dodo_dsl.cli.uninterrupted import undisturbed
-from dodo_dsl.search import postgres
 from dodo_dsl.search.drives import DriveLimits
 from dodo_dsl.search.findings import Findings, document, failures_of, lines
-from dodo_dsl.search.postgres import MAIN
-from dodo_dsl.search.search_loop import SamplingOrder, SearchLoop
+from dodo_dsl.search.search_loop import SearchLoop
 from dodo_dsl.search.shrinking import Shrinker
 from dodo_dsl.search.store import Store, opened
 from dodo_dsl.search.study import Study, refuse_search, search_study
@@ -32,13 +29,15 @@ EXAMPLES = """examples:
   dodo search sil-my-drive --until-failure --runs 400    end as soon as one is found
   dodo search sil-my-drive --sweep         only measure how often it fails
   dodo search sil-my-drive --storage postgresql://dodo@server/dodo    together with other machines
+  dodo search sil-my-drive --storage /mnt/shared/search.journal    the same by a file
 
 The same command continues where an earlier one was interrupted, or adds drives.
 
 exit codes: 0 no drive failed, 1 some failed, 2 wrong usage or spec, 3 none could be judged, 130 interrupted
 """
 
-FILE_NAME = "search.json"
+FILE_NAME, STORE = "search.json", "search.journal"
+MAIN = "main"
 _RUNS = 100
 _MOST_RUNS = 1 << 20
 _MOST_BY_TIME = 1 << 14
@@ -51,7 +50,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--runs", type=positive, metavar="N", help=f"drives (default: {_RUNS}, unless --minutes is given)"
     )
     parser.add_argument(
-        "--sweep", action="store_true", help="no drives near the worst ones: all measure how often it fails"
+        "--sweep", action="store_true", help="no drives at the ends of ranges: all measure how often it fails"
     )
     parser.add_argument(
         "--minutes",
@@ -72,9 +71,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--storage", metavar="URL",
-        help="PostgreSQL database whose drives all workers share (default: a file in DIR/search/TEST)"
+        help="database or file whose drives all workers share (default: a file in DIR/search/TEST)"
     )  # fmt: skip
-    parser.add_argument("--study", metavar="NAME", help=f"with --storage: which search of TEST (default: {MAIN})")
+    parser.add_argument("--study", metavar="NAME", default=MAIN, help=f"which search of TEST (default: {MAIN})")
     parser.add_argument(
         "--finish", action="store_true", help="do not search further: reduce the failures found, and write the result"
     )
@@ -83,19 +82,19 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     require_extra("this", "search")
-    if options.storage is None and options.study is not None:
-        raise UsageError("--study names a search in a database: name that with --storage")
-    if options.storage is not None:
+    if options.storage and options.storage.startswith("postgres"):
         require_extra("--storage", "storage")
     with session(options, stdout) as own:
         study = _study(own)
-        report = options.report.resolve() / "search" / study.test.spec.slug
-        with _store(options, study, report) as store:
+        slug = study.test.spec.slug
+        report = options.report.resolve() / "search" / slug
+        place = str(report / STORE) if options.storage is None else options.storage
+        with opened(place, f"{slug} {options.study}", study.key) as store:
             findings, interrupted = _search(own, study, store, report)
     with undisturbed():
         atomic.write_text(report / FILE_NAME, json_text(document(findings)))
     own.stdout.writelines(f"{line}\n" for line in lines(findings))
-    own.stdout.write(f"search: {options.report / 'search' / study.test.spec.slug / FILE_NAME}\n")
+    own.stdout.write(f"search: {options.report / 'search' / slug / FILE_NAME}\n")
     if interrupted:
         own.stdout.write(INTERRUPTED)
         return Exit.INTERRUPTED
@@ -113,20 +112,16 @@ def _study(own: SearchSession) -> Study:
     return search_study(checked, own.compiled(checked), own.work, own.options.seed)
 
 
-def _store(options: argparse.Namespace, study: Study, report: Path) -> AbstractContextManager[Store]:
-    if options.storage is None:
-        return opened(report, study.key)
-    return postgres.opened(options.storage, options.study or MAIN, study.test.spec.slug, study.key)
-
-
 def _search(own: SearchSession, study: Study, store: Store, report: Path) -> tuple[Findings, bool]:
     """What was found, and whether an interrupt ended it."""
     options, deadline = own.options, _deadline(own.options)
     runs = min(options.runs or (_MOST_BY_TIME if options.minutes else _RUNS), _MOST_RUNS)
-    order = SamplingOrder(study.space, runs, options.seed, not options.sweep)
+    limits = DriveLimits(deadline, a_core=1) if deadline or options.storage else DriveLimits()
     total = runs + 1 if options.runs or not deadline else None
-    with own.drives(study, store, report / "drives", DriveLimits(deadline), total) as drives:
-        loop = SearchLoop(study.test.spec, order, drives, options.until_failure)
+    with own.drives(study, store, report / "drives", limits, total) as drives:
+        loop = SearchLoop(
+            study.test.spec, study.space, runs, options.seed, drives, not options.sweep, options.until_failure
+        )
         shrinker = Shrinker(study, drives, report, runs + 1, _registry(study) if options.save else None)
         end = drives.run(_follow(loop, shrinker))
     return replace(loop.findings(), shrunk=tuple(shrinker.found)), end is not None
@@ -148,5 +143,5 @@ def _registry(study: Study) -> Path:
 
 async def _follow(loop: SearchLoop, shrinker: Shrinker) -> None:
     await loop.follow()
-    failed = loop.failed() if loop.order.proposes else []
+    failed = loop.failed() if loop.corners else []
     await shrinker.shrink(failures_of([drive for _, drive in failed]), failed)

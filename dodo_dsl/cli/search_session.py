@@ -2,7 +2,7 @@
 
 import argparse
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -96,9 +96,7 @@ class SearchProgress:
     def __init__(self, stream: TextIO, total: int | None, deadline: float | None) -> None:
         self._stream, self._total, self._deadline = stream, total, deadline
         self._start = time.monotonic()
-        self._done = self._driven = self._failed = 0
-        self._shrinks = False
-        self._worst: float | None = None
+        self._driven = 0
         self._status = _status(stream) if stream.isatty() else None
 
     def __enter__(self) -> Self:
@@ -128,58 +126,23 @@ class SearchProgress:
     def done(self, outcome: Outcome) -> None:
         """What becomes a drive is shown as one."""
 
-    def driven(self, drive: Drive, repeat: int) -> None:
-        """Counts and shows a drive of this command."""
+    def driven(self, drive: Drive, known: Collection[Drive]) -> None:
+        """Shows a drive of this command, and counts all that are known."""
         self._driven += 1
-        self.count(drive, repeat)
-        self._show(drive)
-
-    def count(self, drive: Drive, repeat: int = 1) -> None:
-        """Counts a drive, also one of an earlier command; one that repeats another is not a further failure."""
-        if repeat > 1 and not self._shrinks:
-            self._total = self._total and self._total + 1
-        self._done += 1
-        self._failed += drive.outcome == "failed" and repeat == 1
-        if drive.margin is not None:
-            self._worst = drive.margin if self._worst is None else min(self._worst, drive.margin)
-
-    def count_other(self, drive: Drive) -> None:
-        """Counts a drive that another worker made meanwhile."""
-        self._driven += 1
-        self.count(drive)
-
-    def begin_shrinking(self, failures: int, most: int) -> None:
-        """From now on, ``most`` drives at most reduce failures."""
-        self._done, self._total, self._deadline, self._shrinks = 0, most, None, True
-        time = f", {about(self._left())}" if self._driven else ""
-        self.note(f"reducing {count(failures, 'failure')}: up to {most} drives{time}; --sweep leaves it out")
-
-    def expect(self, most: int) -> None:
-        """``most`` further drives at most are left."""
-        self._total = self._done + most
-
-    def _show(self, drive: Drive) -> None:
-        of = "" if not self._total else f" of up to {self._total}" if self._shrinks else f" of {self._total}"
-        left = f", {about(self._left())} to go" if self._total or self._deadline else ""
-        if self._shrinks:
-            line = f"{self._done}{of} drives of the reduction{left.replace('about', 'up to')}"
-        else:
-            worst = "" if self._worst is None else f", worst margin {self._worst:.3f}"
-            line = f"{self._done}{of} drives, {count(self._failed, 'failure')}{worst}{left}"
+        now = time.monotonic() - self._start
+        total = self._total if self._total and len(known) <= self._total else None
+        failed = count(sum(one.outcome == "failed" for one in known), "failure")
+        worst = min((one.margin for one in known if one.margin is not None), default=None)
+        line = f"{len(known)}{f' of {total}' if total else ''} drives, {failed}"
+        line += "" if worst is None else f", worst margin {worst:.3f}"
+        ends = [] if self._deadline is None else [max(self._deadline - self._start - now, 0.0)]
+        ends += [now / self._driven * (total - len(known))] if total else []
+        line += f", {about(min(ends))} to go" if ends else ""
         if self._status is not None:
             self._status.update(line)
         else:
-            now = time.monotonic() - self._start
             shown = "" if drive.margin is None else f", margin {drive.margin:.3f}"
             self.note(f"[{now:6.1f} s] {drive.outcome}{shown}; {line}")
-
-    def _left(self) -> float:
-        now = time.monotonic()
-        by_time = None if self._deadline is None else max(self._deadline - now, 0.0)
-        if self._total is None:
-            return by_time or 0.0
-        by_number = (now - self._start) / max(self._driven, 1) * max(self._total - self._done, 0)
-        return by_number if by_time is None else min(by_number, by_time)
 
 
 def _status(stream: TextIO) -> Any:

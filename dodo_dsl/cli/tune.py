@@ -16,7 +16,7 @@ from dodo_dsl.cli.uninterrupted import undisturbed
 from dodo_dsl.search.drives import DriveLimits, RigFailure
 from dodo_dsl.search.store import Store, opened
 from dodo_dsl.search.study import Study, tune_study
-from dodo_dsl.search.tuning import Scenarios, Tuning, document, env, scenarios, table, tuning_order
+from dodo_dsl.search.tuning import Scenarios, Tuning, document, env, scenarios, table
 from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
@@ -31,7 +31,7 @@ exit codes: 0 the best values pass, 1 they fail, 2 wrong usage or spec, 3 not ev
 failed, 130 interrupted
 """
 
-FOLDER, STORE, RESULT, VALUES = "tune", "tune.sqlite", "tune.json", "best.env"
+FOLDER, STORE, RESULT, VALUES = "tune", "tune.journal", "tune.json", "best.env"
 _RUNS = 50
 _MOST_RUNS = 1 << 14
 _RIG_MINUTES, _RIG_METRES = 30.0, 100.0
@@ -54,7 +54,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mean", action="store_true", help="optimise the mean margin, not the worst one")
     parser.add_argument(
         "--samples", type=positive, default=0, metavar="N",
-        help="drive each test at N samples of its ranges, too; N others decide among the best, N more judge the result",
+        help="drive each test at N samples of its ranges, too; N others judge the result",
     )  # fmt: skip
     parser.add_argument("--seed", type=seed, default=0, metavar="S", help="seed of values and samples (default: 0)")
     parser.add_argument(
@@ -74,7 +74,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     with session(options, stdout) as own:
         checked = own.selected(options.tests)
         study = tune_study(checked, own.compiled(checked), own.work, options.samples)
-        with opened(report, study.key, STORE) as store:
+        with opened(str(report / STORE), FOLDER, study.key) as store:
             tuning, end = _tune(own, study, store, report)
             if tuning.done:
                 _write(tuning, report, own.stdout)
@@ -99,7 +99,7 @@ def _tune(own: SearchSession, study: Study, store: Store, report: Path) -> tuple
     limits = _limits(own, driven)
     total = driven.most_drives(runs) if options.runs or not limits.deadline else None
     with own.drives(study, store, report / "drives", limits, total) as drives:
-        tuning = Tuning(driven, tuning_order(study.space, runs, options.seed), drives, options.mean)
+        tuning = Tuning(study.space, driven, runs, options.seed, drives, options.mean)
         return tuning, drives.run(tuning.follow())
 
 
@@ -111,7 +111,7 @@ def _limits(own: SearchSession, driven: Scenarios) -> DriveLimits:
         said = f"on rig {', '.join(driven.rigs)}: at most {options.minutes:g} min, and {options.metres:g} m of driving"
         own.stdout.write(printable(said) + "\n")
     deadline = time.monotonic() + options.minutes * 60 if options.minutes else None
-    return DriveLimits(deadline, options.metres or math.inf)
+    return DriveLimits(deadline, options.metres or math.inf, 1 if deadline else 8)
 
 
 def _write(tuning: Tuning, report: Path, stdout: TextIO) -> None:

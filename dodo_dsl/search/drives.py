@@ -3,11 +3,10 @@
 import asyncio
 import itertools
 import math
-import re
 import shutil
 import signal
 import time
-from collections.abc import Coroutine, Mapping, Sequence
+from collections.abc import Collection, Coroutine, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -32,17 +31,12 @@ from dodo_dsl.source import Entry
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.vary import Values
 
-_ROUND = 8
-"""Drives a core in a round, so that cores hardly wait for its last one; one where time or workers share the drives."""
-_WINDOW = 256
-"""Points that are looked at for the next round, more than workers could drive at once."""
 _REPEAT = "#"
 """No name of a range."""
 _RETRIES = 1
 """A drive that ended in error is driven once more, and left out when it does so again."""
 _DISTANCE, _FASTEST, _TO_START = ("distance", "m"), 1.0, 2.4
 """The check of how far a vehicle drove, the highest speed of a rig, in m/s, and the way across its table, in m."""
-_NUMBERED = re.compile(rf"--{compiler.RUN}-([0-9]{{1,9}})$")
 
 
 class Interrupted(Exception):
@@ -54,22 +48,10 @@ class RigFailure(Exception):
 
 
 class DriveProgress(Progress, Protocol):
-    """Shows how drives go on; ``repeat`` is 1 for the first one at its values."""
+    """Shows how drives go on."""
 
-    def driven(self, drive: Drive, repeat: int) -> None:
-        """One has ended."""
-
-    def count(self, drive: Drive, repeat: int = 1) -> None:
-        """One is known from an earlier command."""
-
-    def count_other(self, drive: Drive) -> None:
-        """Another worker made one meanwhile."""
-
-    def begin_shrinking(self, failures: int, most: int) -> None:
-        """From now on, ``most`` drives at most reduce failures."""
-
-    def expect(self, most: int) -> None:
-        """``most`` further drives at most are left."""
+    def driven(self, drive: Drive, known: Collection[Drive]) -> None:
+        """One has ended; ``known`` are all until then, also those of earlier commands and of other workers."""
 
 
 class KeptBackends:
@@ -140,10 +122,14 @@ class DriveHost:
 
 @dataclass
 class DriveLimits:
-    """No drive begins after ``deadline`` of the monotonic clock, or when rigs drove ``metres`` of ``way``."""
+    """No drive begins after ``deadline`` of the monotonic clock, or when rigs drove ``metres`` of ``way``.
+
+    ``a_core`` are the drives of a round: several, so that cores hardly wait for its last one.
+    """
 
     deadline: float | None = None
     metres: float = math.inf
+    a_core: int = 8
     way: float = 0.0
 
     @property
@@ -161,8 +147,7 @@ class Drives:
     progress: DriveProgress
     folder: Path
     limits: DriveLimits
-    _counted: set[str] = field(default_factory=set)
-    _free: int = 0
+    known: dict[str, Drive] = field(default_factory=dict)
 
     def run(self, work: Coroutine[Any, Any, None]) -> BaseException | None:
         """Does work that drives, and closes the backends. What ended it early, an interrupt or a rig; else None."""
@@ -180,63 +165,33 @@ class Drives:
     async def drive(self, points: Sequence[SearchPoint], first: int | None = None) -> None:
         """Drives the points, as far as the limits allow; those with the same name share a drive.
 
-        They are numbered from ``first`` on, else those that are not known by numbers that are free in the folder.
-        Raises Interrupted and RigFailure.
+        They are numbered from ``first`` on, else as the store does. Raises Interrupted and RigFailure.
         """
-        missing: dict[int, SearchPoint] = {}
-        known = self.store.known([point.name for point in points])
-        for number, (point, drive) in enumerate(zip(points, known, strict=True), first or 0):
-            name = point_text(point.name)
-            if name in self._counted:
-                continue
-            self._counted.add(name)
-            if drive:
-                self.progress.count(drive, point.repeat)
-            else:
-                missing[number] = point
-        if first is None:
-            missing = self._renumbered(missing)
+        missing: dict[str, tuple[int, SearchPoint]] = {}
+        for number, point in enumerate(points, first or 0):
+            missing.setdefault(point_text(point.name), (number, point))
         size = self._size(points)
-        while missing and not self.limits.are_reached:
-            if claimed := self._claimed(missing, size):
+        while True:
+            drives = self.store.known([point.name for _, point in missing.values()])
+            self.known |= {name: drive for name, drive in zip(missing, drives, strict=True) if drive}
+            missing = {name: one for name, one in missing.items() if name not in self.known}
+            if not missing or self.limits.are_reached:
+                return
+            claims = ((*one, self.store.claim(one[1].name)) for one in missing.values())
+            free = ((n if first is not None else claim, point) for n, point, claim in claims if claim is not None)
+            if claimed := dict(itertools.islice(free, size)):
                 await self._round(claimed)
-            elif missing:
+            else:
                 end_like_interrupt()
                 self.store.wait()
-
-    def _renumbered(self, points: dict[int, SearchPoint]) -> dict[int, SearchPoint]:
-        """By the next free numbers: drives of an earlier call that did not pass, or that was killed, keep theirs."""
-        names = [path.name for path in self.folder.iterdir()] if self.folder.is_dir() else []
-        numbers = [int(found[1]) for name in names if (found := _NUMBERED.search(name))]
-        first = max(self._free, *(number + 1 for number in numbers)) if numbers else self._free
-        self._free = first + len(points)
-        return dict(enumerate(points.values(), first))
 
     def _size(self, points: Sequence[SearchPoint]) -> int:
         """How many drives a round has."""
         if any(point.spec.rig for point in points):
             return 1
-        is_long = self.limits.deadline is None and not self.store.is_shared
-        size = max(1, int(self.machine.order.capacity)) * (_ROUND if is_long else 1)
+        size = max(1, int(self.machine.order.capacity)) * self.limits.a_core
         on_host = any(point.spec.isolation == "host" for point in points)
         return min(size, len(self.checked.deployment.cids)) if on_host else size
-
-    def _claimed(self, missing: dict[int, SearchPoint], most: int) -> dict[int, SearchPoint]:
-        """Takes up to ``most`` of the first points out of ``missing``, and those that others have driven."""
-        first = dict(itertools.islice(missing.items(), max(most, _WINDOW)))
-        if self.store.is_shared:
-            known = self.store.known([point.name for point in first.values()])
-            for number, drive in zip(list(first), known, strict=True):
-                if drive:
-                    self.progress.count_other(drive)
-                    del missing[number], first[number]
-        claimed: dict[int, SearchPoint] = {}
-        for number, point in first.items():
-            if len(claimed) == most:
-                break
-            if self.store.claim(point.name):
-                claimed[number] = missing.pop(number)
-        return claimed
 
     async def _round(self, points: dict[int, SearchPoint]) -> None:
         folder = self.machine.work / f"round-{min(points)}"
@@ -274,7 +229,8 @@ class Drives:
         checks = ",".join(failed_checks(outcome))
         drive = Drive(number, point.name, outcome.outcome, worst_margin(outcome), outcome.reason, checks)
         self.store.add(drive)
-        self.progress.driven(drive, point.repeat)
+        self.known[point_text(point.name)] = drive
+        self.progress.driven(drive, self.known.values())
 
     def _jobs(self, points: dict[int, SearchPoint], folder: Path) -> dict[int, Job]:
         tests = {number: self._test(number, point) for number, point in points.items()}

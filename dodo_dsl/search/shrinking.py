@@ -53,42 +53,20 @@ class Shrinker:
     async def shrink(self, failures: Sequence[SearchFailure], failed: Sequence[tuple[Values, Drive]]) -> None:
         """Shrinks the first failures of ``failed`` drives, however long it takes. Raises Interrupted."""
         self.drives.folder, self.drives.limits.deadline = self.report / FOLDER, None
-        kinds = [
-            {drive.number: (values, drive) for values, drive in failed if kind_of(drive.reason) == failure.kind}
-            for failure in failures[:MOST_KINDS]
-        ]
-        if kinds:
-            self.drives.progress.begin_shrinking(len(kinds), sum(map(self._most, kinds)))
-        for number, (failure, of_kind) in enumerate(zip(failures, kinds, strict=False), 1):
-            self.drives.progress.note(f"reducing: {failure.worst.reason}")
-            await self._shrink(of_kind)
-            self.drives.progress.expect(sum(map(self._most, kinds[number:])))
+        for failure in failures[:MOST_KINDS]:
+            self.drives.progress.note(f"reducing: {failure.worst.reason} (--sweep leaves it out)")
+            await self._shrink([one for one in failed if kind_of(one[1].reason) == failure.kind])
         shutil.rmtree(self.report / FOLDER, ignore_errors=True)
 
-    def _most(self, failed: dict[int, tuple[Values, Drive]]) -> int:
-        """Drives that it takes at most to reduce failures of a kind."""
-        shrinking = max(most_drives(self.study.space, values) for values, _ in failed.values())
-        return min(MOST_TRIED, len(failed)) + shrinking + _REPEATS - 1
-
-    async def _shrink(self, of_kind: dict[int, tuple[Values, Drive]]) -> None:
-        first = await self._first(of_kind)
-        if first is None:
-            return
-        values = await self._shrunk(of_kind[first.number][0], first)
-        if texts(values) not in [one.values for one in self.found]:
-            self.found.append(await self._confirmed(values))
-
-    async def _first(self, failed: dict[int, tuple[Values, Drive]]) -> Drive | None:
-        """The drive nearest to the nominal values that fails again; None if none of the MOST_TRIED nearest does."""
-        left = {number: drive for number, (_, drive) in failed.items()}
-        for _ in range(min(MOST_TRIED, len(left))):
-            drive = nearest(self.study.space, list(left.values()))
-            values = failed[drive.number][0]
+    async def _shrink(self, of_kind: Sequence[tuple[Values, Drive]]) -> None:
+        """The failure nearest to the nominal values that fails again, of the MOST_TRIED nearest."""
+        for values, drive in sorted(of_kind, key=lambda one: distance(self.study.space, one[0]))[:MOST_TRIED]:
             await self._drive([values], 2)
             if self._fails(values, drive, 2):
-                return drive
-            del left[drive.number]
-        return None
+                shrunk = await self._shrunk(values, drive)
+                if texts(shrunk) not in [one.values for one in self.found]:
+                    self.found.append(await self._confirmed(shrunk))
+                return
 
     async def _shrunk(self, values: Values, first: Drive) -> Values:
         steps = shrink(self.study.space, values)
@@ -134,27 +112,21 @@ class Shrinker:
         return name
 
 
-def nearest(space: Space, failed: Sequence[Drive]) -> Drive:
-    """The drive that is nearest to the nominal values, by shares of the ranges."""
-    middle = space.point(texts(nominal(space)))
+def distance(space: Space, values: Values) -> float:
+    """From the nominal values, in shares of the ranges."""
+    return sum(_away(one, values[one.name].text) for one in space.ranges)
 
-    def way(drive: Drive) -> tuple[float, int]:
-        point = space.point(dict(drive.values))
-        return sum(abs(one - other) for one, other in zip(point, middle, strict=True)), drive.number
 
-    return min(failed, key=way)
+def _away(one: Range, text: str) -> float:
+    if one.is_list:
+        return float(text != one.nominal.text)
+    low, middle, number, high = map(one.number, (one.ends[0].text, one.nominal.text, text, one.ends[1].text))
+    return float(abs(number - middle) / (high - low))
 
 
 def changed(space: Space, values: Values) -> list[str]:
     """The ranges whose values are not nominal."""
     return [one.name for one in space.ranges if values[one.name].text != one.nominal.text]
-
-
-def most_drives(space: Space, values: Values) -> int:
-    """How many drives ``shrink`` takes at most; most often, values go back to nominal, and it takes far fewer."""
-    away = changed(space, values)
-    numbers = sum(one.name in away and not one.is_list for one in space.ranges)
-    return len(away) * (len(away) + 1) + numbers * _ROUNDS * (_PARTS - 1)
 
 
 def shrink(space: Space, values: Values) -> Shrinking:
@@ -205,14 +177,13 @@ def _nearer(space: Space, values: Values, one: Range) -> Shrinking:
 def name_of(spec: Spec, changed: Sequence[str], taken: set[str]) -> str:
     """A name that is not ``taken``: the test's and the ranges whose values are not nominal."""
     names = "-".join(word for name in changed for word in _NOT_WORD.split(name.lower()) if word)
-    end = f"-fails-at-{names or 'nominal'}"
     for number in range(1, len(taken) + 2):
-        last = end if number == 1 else f"{end[: _MOST_NAME - _LEAST_OF_TEST - len(taken)].rstrip('-')}-{number}"
-        kept = spec.location.stem[: max(_MOST_NAME - len(last), _LEAST_OF_TEST)].rstrip("-")
-        name = f"{kept}{last}"[:_MOST_NAME].rstrip("-")
+        last = f"-{number}" if number > 1 else ""
+        end = f"-fails-at-{names or 'nominal'}"[: _MOST_NAME - _LEAST_OF_TEST - len(last)].rstrip("-") + last
+        name = spec.location.stem[: _MOST_NAME - len(end)].rstrip("-") + end
         if name not in taken:
-            return name
-    raise AssertionError("there are more names than are taken")
+            break
+    return name
 
 
 def text_of(spec: Spec, name: str, values: Values, reason: str) -> str:

@@ -1,10 +1,10 @@
-"""The space that a test's ranges span: its points as values of the spec."""
+"""The space that a test's ranges span: its points as values of the spec, and those that a search drives."""
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
-from functools import cached_property
 
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.source import Mapping, Scalar, resolve
@@ -14,6 +14,8 @@ from dodo_dsl.spec.vary import PLACEHOLDERS, Range, Values
 _STEPS = 3
 """A range of numbers has at least 10 to this power steps, so that values stay short."""
 _LAST = math.nextafter(1.0, 0.0)
+_CORNERS = 64
+"""Drives of a search at the ends of all ranges, at most."""
 
 Point = tuple[float, ...]
 """A share in [0, 1] of each range."""
@@ -29,56 +31,16 @@ class Space:
     def values(self, point: Point) -> Values:
         return {one.name: self._value(one, share) for one, share in zip(self.ranges, point, strict=True)}
 
-    def point(self, texts: dict[str, str]) -> Point:
-        """Where values lie, by their texts: the middle of the shares that become whole numbers and values of lists."""
-        return tuple(self._share(one, texts[one.name]) for one in self.ranges)
-
-    def snapped(self, point: Point) -> tuple[tuple[str, ...], Point]:
-        """The texts of the ``values`` at a point, and the ``point`` of these, in less time than by both."""
-        written, shares = [], []
-        for one, share in zip(self.ranges, point, strict=True):
-            if one.is_list:
-                text = _listed(one, share).text
-                shares.append(self._share(one, text))
-            else:
-                number = self._number(one, share)
-                text = text_of(one, number)
-                shares.append(self._share_of(one, number))
-            written.append(text)
-        return tuple(written), tuple(shares)
-
-    @cached_property
-    def _numbers(self) -> dict[str, tuple[Decimal, Decimal, Decimal]]:
-        """Both ends and the resolution of each range of numbers: they are needed for each of thousands of points."""
-        found = {}
-        for one in self.ranges:
-            if not one.is_list:
-                low, high = (one.number(end.text) for end in one.ends)
-                found[one.name] = low, high, step_of(one)
-        return found
-
-    def _share(self, one: Range, text: str) -> float:
-        if one.is_list:
-            return ([end.text for end in one.ends].index(text) + 0.5) / len(one.ends)
-        return self._share_of(one, one.number(text))
-
-    def _share_of(self, one: Range, number: Decimal) -> float:
-        low, high, _ = self._numbers[one.name]
-        if one.name in self.whole:
-            first, last = math.ceil(low), math.floor(high)
-            return float((number - first) + Decimal("0.5")) / (last - first + 1)
-        return float((number - low) / (high - low))
-
     def _value(self, one: Range, share: float) -> Scalar:
-        return _listed(one, share) if one.is_list else scalar(one, self._number(one, share))
-
-    def _number(self, one: Range, share: float) -> Decimal:
-        low, high, step = self._numbers[one.name]
+        if one.is_list:
+            return one.ends[int(min(share, _LAST) * len(one.ends))]
+        low, high = (one.number(end.text) for end in one.ends)
         if one.name in self.whole:
             first, last = math.ceil(low), math.floor(high)
-            return Decimal(first + int(min(share, _LAST) * (last - first + 1)))
+            return scalar(one, Decimal(first + int(min(share, _LAST) * (last - first + 1))))
+        step = step_of(one)
         number = ((low + (high - low) * Decimal(share)) / step).to_integral_value() * step
-        return min(max(number, low), high)
+        return scalar(one, min(max(number, low), high))
 
 
 def step_of(one: Range) -> Decimal:
@@ -89,16 +51,8 @@ def step_of(one: Range) -> Decimal:
 
 def scalar(one: Range, number: Decimal) -> Scalar:
     """A number of a range as an author writes it."""
-    text = text_of(one, number)
+    text = f"{quantity.decimal_text(number)} {one.unit}".strip()
     return Scalar(one.nominal.span, resolve(text), text)
-
-
-def text_of(one: Range, number: Decimal) -> str:
-    return f"{quantity.decimal_text(number)} {one.unit}".strip()
-
-
-def _listed(one: Range, share: float) -> Scalar:
-    return one.ends[int(min(share, _LAST) * len(one.ends))]
 
 
 def texts(values: Values) -> dict[str, str]:
@@ -128,10 +82,46 @@ def nominal(space: Space) -> Values:
     return vary.nominal(space.ranges)
 
 
-def sweep(space: Space, number: int, seed: int) -> Iterator[Values]:
-    """The first points of a scrambled Sobol sequence, which a longer sweep with the same seed continues."""
+def sobol(dimensions: int, number: int, seed: int) -> Iterator[Point]:
+    """The first points of a scrambled Sobol sequence, which a longer one with the same seed continues."""
     from scipy.stats import qmc
 
-    sequence = qmc.Sobol(len(space.ranges), scramble=True, seed=seed)
+    sequence = qmc.Sobol(dimensions, scramble=True, seed=seed)
     points = sequence.random_base2(max(number - 1, 0).bit_length())[:number]
-    yield from (space.values(tuple(map(float, point))) for point in points)
+    yield from (tuple(map(float, point)) for point in points)
+
+
+def sweep(space: Space, number: int, seed: int) -> Iterator[Values]:
+    """Values that fill the ranges evenly."""
+    yield from map(space.values, sobol(len(space.ranges), number, seed))
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Values to be driven; ``swept`` is whether they belong to the sweep, which shows how often the test fails."""
+
+    values: Values
+    swept: bool
+
+
+def course(space: Space, number: int, seed: int, corners: bool = True) -> Iterator[Candidate]:
+    """The first drives of a search: by turns one of the sweep, and one at an end of each range of numbers.
+
+    They depend on nothing but the seed, so that any number of workers drives them in any order.
+    """
+    swept = sweep(space, number, seed)
+    at_ends = itertools.islice(_corners(space, seed), _CORNERS) if corners else iter(())
+    for turn in range(number):
+        corner = next(at_ends, None) if turn % 2 else None
+        yield Candidate(corner or next(swept), corner is None)
+
+
+def _corners(space: Space, seed: int) -> Iterator[Values]:
+    """Each once, in an order in which few of them have most pairs of ends."""
+    lists = [one.is_list for one in space.ranges]
+    seen: list[tuple[bool, ...]] = []
+    for point in sobol(len(space.ranges), 8 * _CORNERS, (seed + 1) % (1 << 32)):
+        ends = tuple(share >= 0.5 for share, is_list in zip(point, lists, strict=True) if not is_list)
+        if ends not in seen:
+            seen.append(ends)
+            yield space.values(tuple(s if lis else round(s) for s, lis in zip(point, lists, strict=True)))

@@ -1,24 +1,29 @@
-"""A tuning: the defaults, then generation after generation in all scenarios, finals, and held-out scenarios at last."""
+"""A tuning: the defaults, then choices of Optuna's sampler TPE in all scenarios, and at last held-out scenarios.
+
+The sampler is told of drives in the order of the choices, so that these depend on the seed and on earlier drives alone.
+"""
 
 import itertools
 import json
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.search.drives import Drives, SearchPoint
-from dodo_dsl.search.search_loop import Candidate, Margins, SamplingOrder, key
-from dodo_dsl.search.space import Space, nominal, space_of, sweep, texts
+from dodo_dsl.search.space import Space, nominal, sobol, space_of, sweep, texts
 from dodo_dsl.spec import vary
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.vary import Values
 from dodo_dsl.terminal import printable
 
-FINALISTS = 5
-"""The best values of a tuning, among which further samples decide: the best of many was lucky with its own."""
-_SWEPT = 1
-"""Drives of the sweep in a generation: a tuning looks for the best values, and not for an even cover."""
+if TYPE_CHECKING:
+    from optuna import Study
+    from optuna.distributions import BaseDistribution
+
+_TOGETHER = 8
+"""Choices of a generation; those of the first one fill the ranges evenly."""
 _ERROR = -1.0
 """Margin of a drive that ended in error: an application that crashes is worse than any other."""
 _SCENARIO = "#scenario"
@@ -43,10 +48,9 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Scenarios:
-    """Some that are ``guiding`` the tuning, ``deciding`` among the best of it, and ``held_out`` to judge the choice."""
+    """Some that are ``guiding`` the tuning, and others that are ``held_out`` to judge the choice."""
 
     guiding: tuple[Scenario, ...]
-    deciding: tuple[Scenario, ...] = ()
     held_out: tuple[Scenario, ...] = ()
 
     @property
@@ -55,39 +59,21 @@ class Scenarios:
         return sorted({one.spec.rig for one in self.guiding if one.spec.rig})
 
     def most_drives(self, runs: int) -> int:
-        """Defaults and choices in all that guide, the finals, and both in those held out."""
-        return (runs + 1) * len(self.guiding) + FINALISTS * len(self.deciding) + 2 * len(self.held_out)
+        """Defaults and choices in all that guide, and both in those held out."""
+        return (runs + 1) * len(self.guiding) + 2 * len(self.held_out)
 
 
 def scenarios(tests: Sequence[ResolvedTest], samples: int, seed: int) -> Scenarios:
-    """Each test at its nominal values and at samples of its ranges; then as many other samples to decide, and to judge.
-
-    No scenario is in two of them.
-    """
-    guiding: list[Scenario] = []
-    deciding: list[Scenario] = []
-    held_out: list[Scenario] = []
+    """Each test at its nominal values and at samples of its ranges; and as many other samples to judge."""
+    guiding: dict[str, Scenario] = {}
+    held_out: dict[str, Scenario] = {}
     for test in tests:
-        points = _points(test, samples, seed)
-        guiding += [Scenario(test.spec, vary.nominal(test.spec.ranges)), *_next(test, points, samples)]
-        held_out += _next(test, points, samples)
-        deciding += _next(test, points, samples)
-    used = {one.name: one for one in guiding}
-    judging = {one.name: one for one in held_out if one.name not in used}
-    others = {one.name: one for one in deciding if one.name not in used and one.name not in judging}
-    return Scenarios(tuple(used.values()), tuple(others.values()), tuple(judging.values()))
-
-
-def _next(test: ResolvedTest, points: Iterator[Values], number: int) -> list[Scenario]:
-    return [Scenario(test.spec, values) for values in itertools.islice(points, number)]
-
-
-def _points(test: ResolvedTest, samples: int, seed: int) -> Iterator[Values]:
-    return sweep(space_of(test), 3 * samples, seed) if samples and test.spec.ranges else iter(())
-
-
-def tuning_order(space: Space, runs: int, seed: int) -> SamplingOrder:
-    return SamplingOrder(space, runs, seed, seeks_best=True, swept=_SWEPT)
+        points = list(sweep(space_of(test), 2 * samples, seed)) if test.spec.ranges else []
+        for values in (vary.nominal(test.spec.ranges), *points[:samples]):
+            one = Scenario(test.spec, values)
+            guiding[one.name] = one
+        held_out |= {one.name: one for one in (Scenario(test.spec, values) for values in points[samples:])}
+    return Scenarios(tuple(guiding.values()), tuple(one for name, one in held_out.items() if name not in guiding))
 
 
 @dataclass(frozen=True)
@@ -100,64 +86,68 @@ class JudgedPoint:
 
 @dataclass
 class Tuning:
-    """``done`` are the values judged, the defaults first, each of them once.
+    """``done`` are the values judged, the defaults first, each of them once."""
 
-    ``finals`` are the best of them, with their margins in the deciding scenarios, too.
-    """
-
+    space: Space
     scenarios: Scenarios
-    order: SamplingOrder
+    runs: int
+    seed: int
     drives: Drives
     mean: bool
     done: list[JudgedPoint] = field(default_factory=list)
-    finals: list[JudgedPoint] = field(default_factory=list)
 
     @property
     def best(self) -> JudgedPoint:
-        """The first of those with the greatest margin, after the finals if they were driven."""
-        if self.finals:
-            values = max(self.finals, key=lambda one: one.margin).values
-            return next(one for one in self.done if one.values is values)
+        """The first of those with the greatest margin."""
         return max(self.done, key=lambda one: one.margin)
 
     async def follow(self) -> None:
         """Raises Interrupted and RigFailure."""
-        await self._judge([Candidate(nominal(self.order.space), swept=False)], {})
-        await self.order.follow(self._judge)
-        if self.done and self.scenarios.held_out:
+        margins = await self._judge([nominal(self.space)])
+        study, ranges = self._study()
+        for begin in range(0, self.runs if margins else 0, _TOGETHER):
+            trials = [study.ask(ranges) for _ in range(min(_TOGETHER, self.runs - begin))]
+            choices = [self.space.values(tuple(trial.params[name] for name in ranges)) for trial in trials]
+            margins = await self._judge(choices)
+            if len(margins) < len(choices):
+                break
+            for trial, margin in zip(trials, margins, strict=True):
+                study.tell(trial, margin)
+        if self.done:
             self.drives.limits.deadline = None
-            await self._decide()
             await self._drive([self.done[0].values, self.best.values], self.scenarios.held_out)
 
-    async def _decide(self) -> None:
-        best = sorted(self.done, key=lambda one: -one.margin)[:FINALISTS]
-        await self._drive([one.values for one in best], self.scenarios.deciding)
-        both = (*self.scenarios.guiding, *self.scenarios.deciding)
-        margins = [(one.values, self.margin(one.values, both)) for one in best]
-        self.finals = [JudgedPoint(values, margin) for values, margin in margins if margin is not None]
+    def _study(self) -> "tuple[Study, dict[str, BaseDistribution]]":
+        """One in memory, which begins evenly, and its parameters: shares of the ranges."""
+        import optuna
 
-    async def _judge(self, batch: Sequence[Candidate], margins: Margins) -> bool:
-        """Drives the candidates; ``margins`` has negative objectives, as an order looks for the least."""
+        names = [one.name for one in self.space.ranges]
+        with warnings.catch_warnings(action="ignore"):  # of options that Optuna calls experimental
+            sampler = optuna.samplers.TPESampler(
+                seed=self.seed, multivariate=True, constant_liar=True, n_startup_trials=_TOGETHER
+            )
+        study = optuna.create_study(direction="maximize", sampler=sampler)
+        for point in sobol(len(names), _TOGETHER, self.seed):
+            study.enqueue_trial(dict(zip(names, point, strict=True)))
+        return study, {name: optuna.distributions.FloatDistribution(0, 1) for name in names}
+
+    async def _judge(self, choices: Sequence[Values]) -> list[float]:
+        """The objective of each, up to the first that was not driven in all scenarios."""
         try:
-            await self._drive([one.values for one in batch], self.scenarios.guiding)
+            await self._drive(choices, self.scenarios.guiding)
         finally:
-            self._take(batch, margins)
-        return all(key(one.values) in margins for one in batch)
+            margins: list[float] = []
+            for values in choices:
+                margin = self.margin(values, self.scenarios.guiding)
+                if margin is None:
+                    break
+                margins.append(margin)
+                if values not in (one.values for one in self.done):
+                    self.done.append(JudgedPoint(values, margin))
+        return margins
 
-    def _take(self, batch: Sequence[Candidate], margins: Margins) -> None:
-        """What is known of the candidates, up to the first that was not driven in all scenarios."""
-        seen = {key(one.values) for one in self.done}
-        for values in (one.values for one in batch):
-            margin = self.margin(values, self.scenarios.guiding)
-            if margin is None:
-                return
-            margins[key(values)] = -margin
-            if key(values) not in seen:
-                self.done.append(JudgedPoint(values, margin))
-                seen.add(key(values))
-
-    async def _drive(self, candidates: Sequence[Values], scenarios: Sequence[Scenario]) -> None:
-        await self.drives.drive([one.point(values) for values, one in itertools.product(candidates, scenarios)])
+    async def _drive(self, choices: Sequence[Values], scenarios: Sequence[Scenario]) -> None:
+        await self.drives.drive([one.point(values) for values, one in itertools.product(choices, scenarios)])
 
     def margin(self, values: Values, scenarios: Sequence[Scenario]) -> float | None:
         """The objective; None if a scenario was not driven."""
@@ -178,7 +168,7 @@ def document(tuning: Tuning) -> dict[str, Any]:
     held_out = tuning.scenarios.held_out
     return {
         "objective": "mean" if tuning.mean else "worst",
-        "seed": tuning.order.seed,
+        "seed": tuning.seed,
         "scenarios": [one.name for one in tuning.scenarios.guiding],
         "default": {"values": texts(first.values), "margin": first.margin},
         "best": {"values": texts(best.values), "margin": best.margin},
@@ -186,10 +176,6 @@ def document(tuning: Tuning) -> dict[str, Any]:
             {"values": texts(one.values), "margin": one.margin, "best": margin}
             for one, margin in zip(tuning.done, bests, strict=True)
         ],
-        "finals": {
-            "scenarios": [one.name for one in tuning.scenarios.deciding],
-            "values": [{"values": texts(one.values), "margin": one.margin} for one in tuning.finals],
-        },
         "held_out": {
             "scenarios": [one.name for one in held_out],
             "default": [tuning.margin(first.values, [one]) for one in held_out],
@@ -208,13 +194,9 @@ def table(tuning: Tuning) -> Iterator[str]:
     first, best = tuning.done[0], tuning.best
     held_out = tuning.scenarios.held_out
     rows = [("", "default", "best", "range")]
-    for one in tuning.order.space.ranges:
+    for one in tuning.space.ranges:
         rows.append((one.name, first.values[one.name].text, best.values[one.name].text, one.text))
     rows.append((f"{'mean' if tuning.mean else 'worst'} margin", f"{first.margin:.3f}", f"{best.margin:.3f}", ""))
-    if tuning.finals:
-        chosen = max(one.margin for one in tuning.finals)
-        said = f"chosen among the best {len(tuning.finals)} with {len(tuning.scenarios.deciding)} more samples"
-        rows.append(("of the finals", "", f"{chosen:.3f}", said))
     if held_out:
         before, after = (_shown(tuning.margin(one.values, held_out)) for one in (first, best))
         rows.append(("held out", before, after, f"{len(held_out)} samples that did not guide the tuning"))

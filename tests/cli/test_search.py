@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import shutil
 import signal
 import sys
@@ -18,9 +17,7 @@ from dodo_dsl import advice, compiler
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.main import main
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.search import search_loop
 from dodo_dsl.search.drives import DriveLimits
-from dodo_dsl.search.search_loop import FIRST
 from tests.check import examples
 from tests.run.scripted import ScriptedBackend
 from tests.search.scripted_drives import LIMIT, SPEC, scripted_commands, stages, start_of
@@ -95,11 +92,7 @@ def test_a_failure_is_shrunk_to_a_test_of_its_own(search: Search) -> None:
     assert (shrunk["failed"], shrunk["repeats"]) == (3, 3)
     assert LIMIT < start < LIMIT + 0.001
     assert shrunk["spec"] == "example-fails-at-start"
-    announced = re.search(r"^reducing 2 failures: up to (\d+) drives, about \d+ s; --sweep leaves it out$", out, re.M)
-    counted = re.findall(r"; (\d+) of up to (\d+) drives of the reduction, up to \d+ s to go$", out, re.M)
-    assert announced and counted[0] == ("1", announced[1])
-    assert [int(done) for done, _ in counted] == list(range(1, len(counted) + 1))
-    assert all(int(done) <= int(most) <= int(announced[1]) for done, most in counted)
+    assert "reducing: hit wall" in out
     assert f"as a test: {shrunk['spec']}" in out
     assert not Path("report/search/example/shrinking").exists()
     assert main(["compile", "--check", shrunk["spec"]], stdout := StringIO(), StringIO()) == 0, stdout.getvalue()
@@ -148,16 +141,6 @@ def test_a_failure_that_does_not_repeat_is_none(search: Search, words: list[str]
     assert (result(), search.driven) == (before, [])
 
 
-@pytest.mark.thorough
-def test_what_is_saved_replaces_no_other_test(search: Search) -> None:
-    search("example", "--runs", "8", "--save")
-    (shrunk,) = result()["shrunk"]
-    (path,) = (one for one in Path().glob(f"**/{shrunk['spec']}.dodo.yml") if "report" not in one.parts)
-    path.write_text(path.read_text() + "# mine\n")
-    _, out = search("example", "--runs", "9", "--save")
-    assert path.read_text().endswith("# mine\n") and "holds another test" in out
-
-
 def test_a_drive_in_error_is_repeated_once(search: Search) -> None:
     search("example", "--runs", "16", "--sweep")
     twice = {slug for slug in search.driven if search.driven.count(slug) == 2}
@@ -167,7 +150,6 @@ def test_a_drive_in_error_is_repeated_once(search: Search) -> None:
 
 @pytest.mark.thorough
 def test_an_interrupted_search_goes_on_to_the_same_result(search: Search) -> None:
-    """It is interrupted while it sweeps, and again while it drives what the optimiser proposed."""
     words = ("example", "--runs", "16", "-j", "1")
     search(*words, report="whole")
     whole, before = set(search.driven), set[str]()
@@ -177,7 +159,6 @@ def test_an_interrupted_search_goes_on_to_the_same_result(search: Search) -> Non
         assert (code, "the same command goes on" in out) == (130, True)
         assert len(before & set(search.driven)) <= 1
         before |= set(search.driven)
-    assert "example--run-14" in before
     search.ends_at = None
     assert search(*words)[0] == 1
     assert result() == result("whole")
@@ -196,29 +177,11 @@ def test_what_a_killed_search_left_of_a_drive_is_gone_when_it_drives_again(searc
     assert len(search.driven) >= 3 and not any(path.exists() for path in left)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_search_is_interrupted_between_drives_too(
-    search: Search, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
-) -> None:
-    monkeypatch.setattr(search_loop, "propose", lambda *_: os.kill(os.getpid(), number))
-    code, out = search("example", "--runs", "18")
-    assert (code, "the same command goes on" in out, len(set(search.driven))) == (130, True, FIRST + 1)
-
-
 @pytest.mark.thorough
 def test_the_result_is_the_same_however_many_drive_at_once(search: Search) -> None:
     for jobs in ("1", "3"):
         search("example", "--runs", "16", "-j", jobs, report=jobs)
     assert result("1") == result("3")
-
-
-@pytest.mark.thorough
-def test_further_drives_fail_more_often_than_the_sweep(search: Search) -> None:
-    search("example", "--runs", "32", "--seed", "2")
-    found = result()
-    assert found["judged"] + found["errors"] + found["proposed"] >= 32
-    assert found["proposed_failed"] / found["proposed"] > 1.5 * found["rate"] > 0
-    assert sum(one["drives"] for one in found["failures"]) == found["failed"] + found["proposed_failed"]
 
 
 def test_more_runs_continue_the_sweep(search: Search) -> None:
@@ -241,15 +204,6 @@ def test_another_seed_is_another_search(search: Search) -> None:
     code, out = search("example", "--runs", "1", "--seed", "1")
     assert (code, search.driven) == (2, [])
     assert "is of another test, application, range or seed" in out
-
-
-def test_another_map_is_another_search(search: Search) -> None:
-    search("example", "--runs", "1")
-    search("example", "--runs", "1")
-    assert search.driven == []
-    (map_file,) = Path.cwd().glob("**/plain/map.json")
-    map_file.write_text(f"{map_file.read_text()} ")
-    assert search("example", "--runs", "1")[0] == 2
 
 
 def test_a_search_goes_on_in_another_folder(search: Search, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -277,11 +231,6 @@ def test_the_drive_at_the_nominal_values_decides_too(search: Search) -> None:
     assert (code, "at the nominal values: failed" in out) == (1, True)
 
 
-def test_whole_numbers_where_a_parameter_needs_them(search: Search) -> None:
-    search("example", "--runs", "8")
-    assert result()["worst"]["values"]["clutter"].isdecimal()
-
-
 @pytest.mark.thorough
 def test_an_ended_search_is_finished_without_looking_for_more(search: Search) -> None:
     search("example", "--runs", "9", "--sweep")
@@ -294,26 +243,19 @@ def test_an_ended_search_is_finished_without_looking_for_more(search: Search) ->
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("address", "code", "said"),
     [
-        (("--study", "x"), "--study names a search in a database: name that with --storage"),
-        (("--storage", ""), "--storage takes the address of a PostgreSQL server"),
-        (("--storage", "postgresql://u:ge@heim@h/db"), "the address after --storage cannot be read"),
+        ("", 2, "--storage is empty, expected the path of a file, or an address as postgresql://USER@HOST/DATABASE"),
+        ("postgresql://u:geheim@h:port/db", 2, "the address after --storage cannot be read"),
+        ("postgresql://u:geheim@127.0.0.1:1/db", 3, "'postgresql://u:***@127.0.0.1:1/db' cannot be used: "),
+        ("/proc/search.journal", 3, "'/proc/search.journal' cannot be used: "),
     ],
 )
-def test_a_storage_that_cannot_be_used(search: Search, words: tuple[str, ...], said: str) -> None:
-    if words[0] == "--storage":
+def test_a_storage_that_cannot_be_used(search: Search, address: str, code: int, said: str) -> None:
+    if address.startswith("postgresql"):
         pytest.importorskip("psycopg")
-    code, out = search("example", *words)
-    assert (code, search.driven) == (2, [])
-    assert said in out and "heim" not in out
-
-
-def test_an_unreachable_server_is_an_error_without_the_password(search: Search) -> None:
-    pytest.importorskip("psycopg")
-    code, out = search("example", "--storage", "postgresql://u:geheim@127.0.0.1:1/db")
-    assert (code, search.driven) == (3, [])
-    assert "dodo search: postgresql://u:***@127.0.0.1:1/db cannot be used: " in out and "geheim" not in out
+    found, out = search("example", "--storage", address)
+    assert (found, search.driven, said in out, "geheim" in out) == (code, [], True, False), out
 
 
 def test_an_address_in_a_wrong_place_shows_no_password(search: Search, capsys: pytest.CaptureFixture[str]) -> None:
@@ -353,8 +295,3 @@ def test_containers_are_refused(search: Search) -> None:
     compose.write_text(compose.read_text().replace("    x-dodo-process: [python, driver.py]\n", ""))
     code, out = search("example")
     assert (code, "'x-dodo-process'" in out) == (2, True)
-
-
-def test_what_to_install_is_said(search: Search, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "scipy", None)
-    assert search("example") == (2, f"dodo search: this needs scipy: {advice.install('search')}\n")

@@ -117,7 +117,7 @@ def test_the_best_values_are_near_the_best_there_are(tune: Tune) -> None:
     code, out = tune("example", "--runs", "16")
     found = result()
     assert (code, found["default"]["values"]) == (0, {"KP": "0.3", "SPEED": "0.5"})
-    assert abs(float(found["best"]["values"]["KP"]) - BEST) < 0.05
+    assert abs(float(found["best"]["values"]["KP"]) - BEST) < 0.2
     assert found["best"]["margin"] > found["default"]["margin"] + 0.3
     bests = [one["best"] for one in found["progress"]]
     assert bests == sorted(bests) and bests[-1] == found["best"]["margin"]
@@ -130,7 +130,7 @@ def test_the_best_values_are_near_the_best_there_are(tune: Tune) -> None:
 @pytest.mark.parametrize(("more", "ends_at"), [(("--runs", "10"), 10), (("--runs", "2", "--samples", "1"), 7)])
 @pytest.mark.thorough
 def test_an_interrupted_tuning_goes_on_to_the_same_result(tune: Tune, more: tuple[str, ...], ends_at: int) -> None:
-    """Among the optimiser's proposals, and among the samples held out."""
+    """Among the sampler's proposals, and among the samples held out."""
     words = ("example", "-j", "1", *more)
     tune(*words, report="whole")
     whole = len(tune.driven)
@@ -145,31 +145,12 @@ def test_an_interrupted_tuning_goes_on_to_the_same_result(tune: Tune, more: tupl
 
 
 @pytest.mark.thorough
-def test_drives_of_an_earlier_call_keep_their_folders(tune: Tune) -> None:
-    """The recorder replaces no recording, so a drive in such a folder would end in error."""
-    tune("example", "--runs", "1")
-    (folder,) = {path.parent for path in Path("report").rglob("*--run-*")} or {Path("report/tune/drives")}
-    kept = folder / f"{tune.driven[-1].rpartition('--')[0]}--run-7" / "test.rec"
-    kept.parent.mkdir(parents=True)
-    kept.write_text("why it failed")
-    tune("example", "--runs", "3")
-    assert kept.read_text() == "why it failed"
-    assert min(int(slug.rpartition("-")[2]) for slug in tune.driven) == 8
-
-
-@pytest.mark.thorough
 def test_samples_held_out_are_others(tune: Tune) -> None:
     _, out = tune("example", "--runs", "4", "--samples", "2")
     found = result()
     held_out = found["held_out"]
     assert (len(found["scenarios"]), len(held_out["scenarios"])) == (3, 2)
-    finals = found["finals"]
-    assert len(finals["scenarios"]) == 2
     assert not set(found["scenarios"]) & set(held_out["scenarios"])
-    assert not set(finals["scenarios"]) & {*found["scenarios"], *held_out["scenarios"]}
-    assert len(finals["values"]) == 5
-    assert found["best"]["values"] == max(finals["values"], key=lambda one: one["margin"])["values"]
-    assert "chosen among the best 5 with 2 more samples" in out
     assert min(held_out["best"]) > min(held_out["default"])
     assert "2 samples that did not guide the tuning" in out
 

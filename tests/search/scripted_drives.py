@@ -1,8 +1,8 @@
 """A test whose drives end as their values say, without processes."""
 
 import asyncio
+import os
 import signal
-import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -87,12 +87,4 @@ def scripted_commands(folder: Path, spec: str, make: Callable[[Plan, int], Scrip
 def stub(patch: pytest.MonkeyPatch, make: Callable[[Plan, int], ScriptedBackend]) -> None:
     patch.setattr(asyncio, "run", scripted.run)
     patch.setattr(search_session, "CombinedBackends", lambda *_, **__: ScriptedBackends(make))
-    connect = sqlite3.connect
-
-    def connected(path: Path) -> sqlite3.Connection:
-        """What is kept survives the process, but no power cut, for which each drive would wait for the disk."""
-        connection = connect(path)
-        connection.execute("pragma synchronous = off")
-        return connection
-
-    patch.setattr(sqlite3, "connect", connected)
+    patch.setattr(os, "fsync", lambda _: None)  # no power cut is tried

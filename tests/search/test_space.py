@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.search.space import Space, nominal, sweep, texts
+from dodo_dsl.search.space import Space, course, nominal, sweep, texts
 from dodo_dsl.spec import vary
 from tests.source.nodes import mapping
 
@@ -33,18 +33,6 @@ ONE = space(
 )
 def test_values_of_a_point(point: tuple[float, ...], expected: dict[str, str]) -> None:
     assert texts(ONE.values(point)) == expected
-
-
-@given(st.tuples(st.floats(0, 1), st.floats(0, 1), st.floats(0, 1)))
-def test_the_point_of_values_has_these_values(point: tuple[float, ...]) -> None:
-    values = texts(ONE.values(point))
-    assert texts(ONE.values(ONE.point(values))) == values
-
-
-@given(st.tuples(st.floats(0, 1), st.floats(0, 1), st.floats(0, 1)))
-def test_a_point_is_snapped_to_its_values(point: tuple[float, ...]) -> None:
-    values = texts(ONE.values(point))
-    assert ONE.snapped(point) == (tuple(values.values()), ONE.point(values))
 
 
 def test_bare_numbers_are_numbers_of_the_spec() -> None:
@@ -74,3 +62,20 @@ def test_a_longer_sweep_begins_with_the_shorter_one() -> None:
 
 def test_the_nominal_values() -> None:
     assert texts(nominal(ONE)) == {"x": "0 cm", "n": "1", "m": "b"}
+
+
+def test_a_search_drives_by_turns_evenly_and_at_the_ends() -> None:
+    found = list(course(ONE, 40, 7))
+    swept = [texts(one.values) for one in found if one.swept]
+    assert swept == [texts(values) for values in sweep(ONE, len(swept), 7)]
+    others = [texts(one.values) for one in found[1:8:2]]
+    assert sorted((one["x"], one["n"]) for one in others) == [
+        ("-8 cm", "0"),
+        ("-8 cm", "3"),
+        ("10 cm", "0"),
+        ("10 cm", "3"),
+    ]
+    assert all(one.swept for one in (*found[::2], *found[8:])), "there are four corners"
+    assert all(one.swept for one in course(ONE, 9, 7, corners=False))
+    assert list(course(ONE, 9, 7)) == found[:9]
+    assert list(course(ONE, 9, 2**32 - 1))

@@ -1,62 +1,79 @@
-"""Drives in a file."""
+"""Drives in a storage that workers share."""
 
-import contextlib
-import sqlite3
-from dataclasses import replace
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from dodo_dsl.search.store import FILE_NAME, Drive, OtherSearch, opened
+from dodo_dsl.search import store as stores
+from dodo_dsl.search.store import Drive, OtherSearch, StorageProblem, opened
 
-DRIVE = Drive(3, {"x": "1 m", "m": "ä"}, "failed", -0.1, "hit wall")
+DRIVE = Drive(3, {"x": "1 m", "m": "ä"}, "failed", -0.1, "hit wall \0\udc80", "wall-margin")
+CRASH = Drive(4, {"x": "2 m"}, "error", None, "")
+WHAT = ("test main", "key")
 
 
-def test_drives_stay(tmp_path: Path) -> None:
-    with opened(tmp_path / "new", "key") as store:
+@pytest.fixture(params=["{}/new/search.journal", pytest.param("sqlite:///{}/drives.db", marks=pytest.mark.thorough)])
+def place(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    return str(request.param.format(tmp_path))
+
+
+def test_drives_stay(place: str) -> None:
+    with opened(place, *WHAT) as store:
         assert store.get(DRIVE.values) is None
+        assert store.claim(DRIVE.values) == 0
         store.add(DRIVE)
-    with opened(tmp_path / "new", "key") as store:
-        assert store.get({"m": "ä", "x": "1 m"}) == DRIVE
-
-
-def test_the_first_drive_at_some_values_stays(tmp_path: Path) -> None:
-    with opened(tmp_path, "key") as store:
-        store.add(DRIVE)
-        store.add(Drive(4, DRIVE.values, "passed", 1.0, ""))
-        assert store.get(DRIVE.values) == DRIVE
-
-
-def test_a_file_of_an_earlier_version_goes_on(tmp_path: Path) -> None:
-    with opened(tmp_path, "key") as store:
-        store.add(replace(DRIVE, checks="wall-margin"))
-    with contextlib.closing(sqlite3.connect(tmp_path / FILE_NAME)) as file, file:
-        file.execute("alter table drives drop column checks")
-    with opened(tmp_path, "key") as store:
-        assert store.get(DRIVE.values) == DRIVE
-        store.add(other := Drive(4, {"x": "2 m", "m": "ä"}, "failed", -0.1, "hit wall", "wall-margin"))
-        assert store.get(other.values) == other
-
-
-def test_another_study_is_refused(tmp_path: Path) -> None:
-    with opened(tmp_path, "key"):
-        pass
-    with pytest.raises(OtherSearch, match="is of another test"), opened(tmp_path, "other"):
+        assert store.claim(CRASH.values) == 1
+        store.add(CRASH)
+    with opened(place, *WHAT) as store:
+        assert store.known([{"x": "3 m"}, {"m": "ä", "x": "1 m"}, CRASH.values]) == [None, DRIVE, CRASH]
+        assert store.claim(DRIVE.values) is None
+    with opened(place, "test other", "other key") as store:
+        assert store.get(DRIVE.values) is None
+    with pytest.raises(OtherSearch, match="is of another test"), opened(place, "test main", "other key"):
         pass
 
 
-def test_a_file_that_others_lock_is_an_error_of_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    connect = sqlite3.connect
-    monkeypatch.setattr(sqlite3, "connect", lambda path: connect(path, timeout=0))
-    with opened(tmp_path, "key") as store, contextlib.closing(connect(tmp_path / FILE_NAME)) as other:
-        other.execute("begin exclusive")
-        with pytest.raises(OtherSearch, match="cannot be used: database is locked"):
-            store.add(DRIVE)
-        with pytest.raises(OtherSearch, match="cannot be used: database is locked"):
-            store.get(DRIVE.values)
+def test_values_are_claimed_by_one_worker_until_it_gives_up(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with opened(place, *WHAT) as one, opened(place, *WHAT) as other:
+        assert (one.claim(DRIVE.values), other.claim(DRIVE.values)) == (0, None)
+        one.close()
+        assert other.claim(DRIVE.values) is not None
+        other.add(DRIVE)
+        assert one.get(DRIVE.values) == DRIVE
+        other.claim(later := {"x": "2 m"})
+        assert one.claim(later) is None
+        monkeypatch.setattr(stores, "PATIENCE_S", 0.0)
+        assert one.claim(later) is not None, "it may be of a machine that is gone"
 
 
-def test_a_file_that_is_no_store(tmp_path: Path) -> None:
-    (tmp_path / FILE_NAME).write_text("no database, but long enough to be read as one" * 100)
-    with pytest.raises(OtherSearch, match="cannot be used: file is not a database"), opened(tmp_path, "key"):
+def test_a_worker_that_is_gone_claims_nothing(place: str) -> None:
+    code = (
+        "import os, sys; from dodo_dsl.search.store import Store; store = Store(*sys.argv[1:]); "
+        "print(store.claim({'x': '1'}), flush=True); os.kill(os.getpid(), 9)"
+    )
+    words = [sys.executable, "-c", code, place, *WHAT]
+    assert subprocess.run(words, capture_output=True, text=True, check=False).stdout == "0\n"
+    with opened(place, *WHAT) as store:
+        assert store.claim({"x": "1"}) == 1
+
+
+def test_a_line_that_a_power_cut_left_unfinished_is_cut_off(tmp_path: Path) -> None:
+    place = tmp_path / "search.journal"
+    with opened(str(place), *WHAT) as store:
+        store.claim(DRIVE.values)
+        store.add(DRIVE)
+    with place.open("a") as file:
+        file.write('{"op_code": 4, "wor')
+    for _ in range(2):
+        with opened(str(place), *WHAT) as store:
+            assert store.get(DRIVE.values) == DRIVE
+            store.claim({"x": "7 m"})
+
+
+def test_a_file_that_is_no_journal(tmp_path: Path) -> None:
+    path = tmp_path / "search.journal"
+    path.write_text("no journal\n" * 3)
+    with pytest.raises(StorageProblem, match="cannot be used: "), opened(str(path), *WHAT):
         pass

@@ -19,7 +19,7 @@ def run(time: float | None, margin: float = 0.25, outcome: Result = "passed", na
 
 
 def order(**teams: list[Outcome]) -> list[tuple[int, str]]:
-    return [(each.place, each.team.name) for each in rank(teams)]
+    return [(each.place, each.name) for each in rank(teams)]
 
 
 def test_a_run_scores_the_weighted_mean_of_its_goals() -> None:
@@ -45,36 +45,36 @@ def test_a_test_without_an_answer_counts_as_failed() -> None:
     assert order(part=[run(10.0)], whole=[run(20.0), other]) == [(1, "whole"), (2, "part")]
     assert order(part=[run(10.0), broken], whole=[run(20.0), other]) == [(1, "whole"), (2, "part")]
     (ranked,) = rank({"lucky": [broken, other]})
-    assert (ranked.team.failure_rate, ranked.team.tests["other"].errors) == (0.0, 1)
+    assert (ranked.failure_rate, ranked.tests["other"].errors) == (0.0, 1)
 
 
 def test_repeated_runs_are_of_one_test() -> None:
     (ranked,) = rank({"a": [run(10.0, name="t[x=1]"), run(20.0, name="t[x=1][run=2]"), run(10.0, name="t[x=2]")]})
-    assert {name: len(test.scores) for name, test in ranked.team.tests.items()} == {"t[x=1]": 2, "t[x=2]": 1}
-    assert ranked.team.interval is None
+    assert {name: len(test.scores) for name, test in ranked.tests.items()} == {"t[x=1]": 2, "t[x=2]": 1}
+    assert ranked.interval is None
 
 
 def test_runs_at_samples_of_the_ranges_are_of_one_test() -> None:
     names = ("t[sample=1,light=0.7]", "t[sample=2,light=1.1][run=2]", "u[x=1,sample=1,of=[a]]", "u[x=1,sample=2,of=b]")
     (ranked,) = rank({"a": [run(10.0, name=name) for name in names]})
-    assert {name: len(test.scores) for name, test in ranked.team.tests.items()} == {"t": 2, "u[x=1]": 2}
+    assert {name: len(test.scores) for name, test in ranked.tests.items()} == {"t": 2, "u[x=1]": 2}
 
 
 def test_runs_of_joined_reports_are_of_one_test() -> None:
     names = ("t", "t[report=2]", "t[run=2][report=2]")
     (ranked,) = rank({"a": [run(10.0, name=name) for name in names]})
-    assert {name: len(test.scores) for name, test in ranked.team.tests.items()} == {"t": 3}
+    assert {name: len(test.scores) for name, test in ranked.tests.items()} == {"t": 3}
 
 
 def test_the_interval_of_one_test_is_students() -> None:
     from scipy import stats
 
     (ranked,) = rank({"a": [run(time) for time in (14.0, 15.0, 15.5, 13.0)]})
-    scores = ranked.team.tests["t"].scores
+    scores = ranked.tests["t"].scores
     expected = stats.t.interval(0.95, 3, np.mean(scores), stats.sem(scores))
-    assert ranked.team.interval == pytest.approx(expected)
+    assert ranked.interval == pytest.approx(expected)
     (same,) = rank({"a": [run(14.0), run(14.0)]})
-    assert same.team.interval == (same.team.score, same.team.score)
+    assert same.interval == (same.score, same.score)
 
 
 def test_the_interval_of_two_tests_is_welchs() -> None:
@@ -83,7 +83,7 @@ def test_the_interval_of_two_tests_is_welchs() -> None:
 
     first, second = (14.0, 15.0, 15.5, 14.5), (12.0, 13.0, 14.0, 12.5)
     (ranked,) = rank({"a": [*(run(time) for time in first), *(run(time, name="u") for time in second)]})
-    scores = [test.scores for test in ranked.team.tests.values()]
+    scores = [test.scores for test in ranked.tests.values()]
     welch = stats.ttest_ind(*scores, equal_var=False)
     wide = stats.t.ppf(0.975, np.floor(welch.df)) * np.hypot(*(stats.sem(each) for each in scores)) / 2
-    assert ranked.team.interval == pytest.approx((ranked.team.score - wide, ranked.team.score + wide))
+    assert ranked.interval == pytest.approx((ranked.score - wide, ranked.score + wide))
