@@ -1,24 +1,19 @@
-"""How many drives dodo search needs until it finds a planted bug, beside uniform random drives and VerifAI.
+"""How many drives dodo search needs until it finds a planted bug, beside uniform random drives.
 
     python benchmarks/planted/functions.py [--seeds 5] [--most 400]
 
 A drive is stood in for by a function: an application that fails in a corner of two to four of its ranges, whatever the
 others are, and whose margin elsewhere falls off in some of the ranges, or in none of those of the bug. No program runs,
-so this compares ways to search and shows nothing about the time of a drive. VerifAI's cross-entropy sampler takes part
-where its package is installed; it gets the same margins and learns from those below LEARNS_BELOW, as with its default
-of 0 it would be random until the first failure.
+so this compares ways to search and shows nothing about the time of a drive.
 """
 
 import argparse
-import importlib.util
 import random
 import statistics
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # this checkout
 
@@ -27,7 +22,6 @@ from dodo_dsl.search.space import Space, course, texts
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.vary import Range
 
-LEARNS_BELOW = 0.35
 _SPARE, _LEAST, FAILED = 0.5, 0.02, -0.4
 
 
@@ -89,32 +83,12 @@ def at_random(bug: Bug, seed: int) -> Iterator[float]:
         yield bug.margin([generator.random() for _ in range(bug.ranges)])
 
 
-def by_cross_entropy(bug: Bug, seed: int) -> Iterator[float]:
-    """VerifAI's sampler with its default buckets and rate of learning."""
-    from verifai.features import Box, Feature, FeatureSpace  # type: ignore[import-not-found]
-    from verifai.samplers.feature_sampler import FeatureSampler, default_sampler_params  # type: ignore[import-not-found]
-
-    random.seed(seed)
-    np.random.seed(seed)
-    words = default_sampler_params("ce")
-    words.thres = LEARNS_BELOW
-    names = [f"r{number}" for number in range(bug.ranges)]
-    sampler = FeatureSampler.crossEntropySamplerFor(FeatureSpace({n: Feature(Box([0, 1])) for n in names}), words)
-    margin = None
-    while True:
-        sample = sampler.nextSample(margin)
-        margin = bug.margin([float(getattr(sample, name)[0]) for name in names])
-        yield margin
-
-
 def until_failure(margins: Iterator[float], most: int) -> int:
     """The number of drives up to the first failure; one more than ``most`` if none of these fails."""
     return next((number for number, margin in enumerate(margins, 1) if margin < 0 or number > most), most + 1)
 
 
-def ways() -> dict[str, Callable[[Bug, int], Iterator[float]]]:
-    found = {"search": searched, "random": at_random}
-    return {**found, "VerifAI": by_cross_entropy} if importlib.util.find_spec("verifai") else found
+WAYS: dict[str, Callable[[Bug, int], Iterator[float]]] = {"search": searched, "random": at_random}
 
 
 def options() -> argparse.ArgumentParser:
@@ -126,11 +100,11 @@ def options() -> argparse.ArgumentParser:
 
 def print_table(bugs: Iterable[Bug], flags: argparse.Namespace) -> None:
     """A line a bug, as soon as it is known."""
-    names = "".join(f"{name:<18}" for name in ways())
+    names = "".join(f"{name:<18}" for name in WAYS)
     print(f"{'bug':<30} volume  {names}random, by the volume", flush=True)
     for bug in bugs:
         cells = []
-        for way in ways().values():
+        for way in WAYS.values():
             found = [until_failure(way(bug, seed), flags.most) for seed in range(flags.seeds)]
             cells.append(f"{f'{statistics.median(found):g} ({min(found)} to {max(found)})':<18}")
         print(f"{bug.name:<30} {bug.volume:6.2%}  {''.join(cells)}{0.693 / bug.volume:.0f}", flush=True)

@@ -3,9 +3,9 @@
     python benchmarks/planted/programs.py none --most 300
     python benchmarks/planted/measured.py [--drives build/planted/none-0/dodo-report/search/planted/search.journal]
 
-A drive in a bug's corner fails; elsewhere its margin is interpolated between the measured ones. So many seeds, uniform
-random drives and VerifAI's sampler are compared without thousands of drives. What a bug with an onset changes outside
-its corner is left out, which makes it harder to find than programs.py does.
+A drive in a bug's corner fails; elsewhere its margin is interpolated between the measured ones. So many seeds and
+random drives are compared without thousands of drives. What a bug with an onset changes outside its corner is left
+out, which makes it harder to find than programs.py does.
 """
 
 import json

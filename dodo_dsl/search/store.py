@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SCHEME = "://"
 _POSTGRES = re.compile(r"postgres(ql)?(?=://)")
-_PASSWORD = re.compile(r"(://[^/@:\s]*):.*@", re.DOTALL)
+_PASSWORD = re.compile(r"(:/+[^/@:\s]*):.*@", re.DOTALL)
 _PARAMETER = re.compile(r"([?&](?:ssl)?password=)[^&\s'\"]*")
 _EXPECTED = "expected the path of a file, or an address as postgresql://USER@HOST/DATABASE"
 _PAUSE_S = 0.2
@@ -98,7 +98,7 @@ class Store:
         return [self._drives.get(name) for name in names]
 
     def claim(self, values: Mapping[str, str]) -> int | None:
-        """A number of its own for a drive at these values; None if another worker makes it, or has made it."""
+        """A separate number for a drive at these values; None if another worker makes it, or has made it."""
         from optuna.trial import TrialState, create_trial
 
         name = point_text(values)

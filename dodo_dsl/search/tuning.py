@@ -1,6 +1,6 @@
 """A tuning: the defaults, then choices of Optuna's sampler TPE in all scenarios, and at last held-out scenarios.
 
-The sampler is told of drives in the order of the choices, so that these depend on the seed and on earlier drives alone.
+The sampler gets margins in the order of the choices, so that these depend on the seed and on earlier drives alone.
 """
 
 import itertools

@@ -73,7 +73,7 @@ PIPELINES = {
     "DODO_API_TOKEN": "token by which `dodo report --gitlab` fetches the reports of child pipelines",
     "DODO_COMPILE_OPTIONS": "further options of `dodo compile`",
     "DODO_RUN_OPTIONS": "options of `dodo run` in every test, in place of the input `run-options`",
-    "DODO_SEARCH_STORAGE": "address of the PostgreSQL database of searches; its password is `PGPASSWORD`",
+    "DODO_SEARCH_STORAGE": "address of the database of searches; its password is `PGPASSWORD`",
     "DODO_PARENT_PIPELINE_ID": "of a child pipeline: the pipeline whose job `dodo-compile` has its tests",
 }
 INPUTS = {

@@ -80,7 +80,7 @@ LONG = "sil-" + "-".join(["chicane"] * 7)
         ("sil-chicane", [], set(), "sil-chicane-fails-at-nominal"),
         ("sil-chicane", ["a"], {"sil-chicane-fails-at-a"}, "sil-chicane-fails-at-a-2"),
         (LONG, ["light"], set(), "sil-chicane-chicane-chicane-chicane-chicane-c-fails-at-light"),
-        (LONG, ["bend" * 20], set(), "sil-chicane-chicane-fails-at-bendbendbendbendbendbendbe"),
+        (LONG, ["bend" * 20], set(), "sil-chicane-chicane-fails-at-bendbendbendbendbendbendbendbe"),
     ],
 )
 def test_a_test_is_named_after_what_was_shrunk(test: str, changed: list[str], taken: set[str], name: str) -> None:
