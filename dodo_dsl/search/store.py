@@ -23,7 +23,7 @@ _POSTGRES = re.compile(r"postgres(ql)?(?=://)")
 _PASSWORD = re.compile(r"(:/+[^/@:\s]*):.*@", re.DOTALL)
 _PARAMETER = re.compile(r"([?&](?:ssl)?password=)[^&\s'\"]*")
 _EXPECTED = "expected the path of a file, or an address as postgresql://USER@HOST/DATABASE"
-_PAUSE_S = 0.2
+_PAUSE_S, _TABLES_S = 0.2, 2.0
 PATIENCE_S = 180.0
 """What another machine claimed so long ago is driven again by a worker that has nothing else to do."""
 
@@ -182,7 +182,7 @@ class Store:
 def _opened(place: str) -> "BaseStorage":
     from optuna.storages import JournalStorage, RDBStorage, get_storage
     from optuna.storages.journal import JournalFileBackend, JournalFileSymlinkLock
-    from sqlalchemy.exc import ArgumentError
+    from sqlalchemy.exc import ArgumentError, DBAPIError
 
     if SCHEME not in place:
         if not place:
@@ -191,10 +191,14 @@ def _opened(place: str) -> "BaseStorage":
         lock = JournalFileSymlinkLock(place)
         _mend(Path(place), lock)
         return JournalStorage(JournalFileBackend(place, lock))
+    address = _POSTGRES.sub("postgresql+psycopg", place)
     try:
-        storage = RDBStorage(_POSTGRES.sub("postgresql+psycopg", place), engine_kwargs={"pool_pre_ping": True})
+        storage = RDBStorage(address, engine_kwargs={"pool_pre_ping": True})
     except (ArgumentError, ValueError):
         raise OtherSearch(f"the address after --storage cannot be read, {_EXPECTED}") from None
+    except DBAPIError:  # another worker makes the tables
+        time.sleep(_TABLES_S)
+        storage = RDBStorage(address, engine_kwargs={"pool_pre_ping": True})
     return get_storage(storage)
 
 
