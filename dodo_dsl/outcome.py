@@ -279,6 +279,8 @@ class Outcome:
     measured."""
     goals: tuple[Goal, ...] = ()
     """The soft goals of the test, for dodo rank."""
+    headline: str = ""
+    """The check that the test names to be shown first; empty if it names none."""
     decided_by: str = ""
     """The evaluator whose verdict is the outcome; empty if several passed, or something else decided."""
 

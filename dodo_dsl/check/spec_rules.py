@@ -174,7 +174,15 @@ def check_until(context: RuleContext) -> Iterator[Diagnostic]:
 
 
 def check_goals(context: RuleContext) -> Iterator[Diagnostic]:
-    yield from resolved_goals(context.test)[1]
+    test, headline = context.test, context.test.spec.headline
+    yield from resolved_goals(test)[1]
+    if headline and test.is_complete and _unit(test, headline) is None:
+        yield _unknown_check(test, headline, test.spec.span("headline"))
+
+
+def _unknown_check(test: ResolvedTest, name: str, span: Span) -> Diagnostic:
+    hint = did_you_mean(name, _units(test))
+    return Diagnostic(span, "unknown-check", f"no evaluator of the test has a check '{name}'", hint)
 
 
 _OF_THE_TEST = {
@@ -199,8 +207,7 @@ def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal | Diagnostic | No
     """A goal or its problem; None if a key is not valid, or a service that is not known may have the check."""
     unit, written = _unit(test, name), plain(entry.value)
     if unit is None and test.is_complete:
-        hint = did_you_mean(name, _units(test))
-        return Diagnostic(entry.key, "unknown-check", f"no evaluator of the test has a check '{name}'", hint)
+        return _unknown_check(test, name, entry.key)
     if unit is None or not {"better", "zero", "one"} <= written.keys():
         return None
     scalars = {k: e.value for k, e in entry.value.entries.items()} if isinstance(entry.value, Mapping) else {}

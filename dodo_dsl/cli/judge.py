@@ -15,8 +15,8 @@ from dodo_dsl.diagnostics import Piece
 from dodo_dsl.outcome import Outcome, Result
 from dodo_dsl.plan.added_services import RECORDING
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.report import comparison, results
-from dodo_dsl.report.report_folder import Drawable, write_report
+from dodo_dsl.report import checks, results
+from dodo_dsl.report.report_folder import Drawable, draw_test, write_summaries
 from dodo_dsl.run.judge import LOGS, Judgement, judge
 from dodo_dsl.run.outcomes import Finding, outcome_of
 from dodo_dsl.run.protocol import VerdictEvent
@@ -115,7 +115,7 @@ def _comparison(plan: Plan, judgement: Judgement, run: KnownRun | None) -> Itera
 def _checks(verdict: VerdictEvent) -> Iterator[str]:
     for check in verdict.checks:
         unit = f" {check['unit']}" if check["unit"] else ""
-        limits = ", ".join(comparison.limits(check))
+        limits = ", ".join(checks.limits(check))
         value = "none" if check["value"] is None else f"{_text(check['value'])}{unit}"
         margin = check.get("margin")
         margin_text = "" if margin is None else f", margin {_text(margin)}{unit}"
@@ -196,7 +196,9 @@ def _write_report(folder: Path, test: Drawable, recording: TestRecording, judgem
         notes=judgement.notes,
         last_lines=judgement.last_lines,
     )
-    return write_report(folder, [outcome], {test.plan.slug: test})
+    problems = draw_test(folder, outcome, test)
+    write_summaries(folder, [outcome])
+    return problems
 
 
 def _told(

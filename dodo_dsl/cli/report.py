@@ -48,12 +48,12 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         output = options.output or (REPORT if options.gitlab else None)
         reports = [*map(read_given, folders), *fetched]
         target, outcomes = _drawn(reports, output, stdout)
-    from dodo_dsl.report.join import write_other_ways
+    from dodo_dsl.report.join import write_other_paths
 
     comparison = compare(outcomes, other) if other else None
     circumstances = results.joined(reports)
-    write_summaries(target, outcomes, comparison, circumstances)
-    write_other_ways(target, comparison, other)
+    write_summaries(target, outcomes, circumstances, comparison)
+    write_other_paths(target, comparison, other)
     if comparison:
         stdout.writelines(f"{line}\n" for line in change_lines(comparison))
     stdout.write(f"report: {target / 'index.html'}\n")

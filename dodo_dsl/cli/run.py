@@ -30,7 +30,7 @@ from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report.next_report import Drawings, next_report
 from dodo_dsl.report.repetitions import Repeated, repeated
-from dodo_dsl.report.results import Circumstances
+from dodo_dsl.report.results import Circumstances, GivenReport
 from dodo_dsl.run.backends import COMBINATIONS, Backends, CombinedBackends, Job
 from dodo_dsl.run.process.processes import may_enter
 from dodo_dsl.run.protocol import BackendError
@@ -191,7 +191,9 @@ def _main(options: argparse.Namespace, stdout: TextIO) -> int:
         gc.enable()
         with reserved(options.report, stdout):
             source, said = origin(options, deployment), options.verbosity
-            outcomes, is_reported, repeats = run(runner, jobs, options.report, stdout, source, said=said)
+            is_part = bool(options.test or options.level or options.compiled)
+            others = run_report.earlier(options.report, [job.plan.name for job in jobs]) if is_part else None
+            outcomes, is_reported, repeats = run(runner, jobs, options.report, stdout, source, others, said)
         if runner.kept:
             stdout.write("\n".join(["", *runner.kept, ""]))
             folder.kept = True
@@ -245,16 +247,15 @@ def run(
     report: Path,
     stdout: TextIO,
     source: Origin,
-    others: Sequence[Outcome] = (),
+    others: GivenReport | None = None,
     said: Verbosity = Verbosity.NORMAL,
 ) -> tuple[list[Outcome], bool, Sequence[Repeated]]:
     """The outcomes, whether the report holds all of them, and repetitions; they are printed in any case.
 
-    ``others`` are outcomes of tests that did not run again and stay in the report.
+    ``others`` are tests that did not run again and stay in the report.
     """
-    slugs, kept = [job.plan.slug for job in jobs], {outcome.slug for outcome in others}
-    in_place = runner.keep
-    with recording(source) as record, next_report(report.resolve(), slugs, kept, in_place) as target:
+    slugs = [job.plan.slug for job in jobs]
+    with recording(source) as record, next_report(report.resolve(), slugs, in_place=runner.keep) as target:
         jobs = [replace(job, report=target.folder / job.plan.slug) for job in jobs]
         with Drawings(target.folder) as drawings, runner.progress:
             outcomes = asyncio.run(runner.run(jobs, lambda job, outcome: drawings.begin(outcome, drawable(job))))
@@ -269,9 +270,7 @@ def run(
         stdout.flush()
         with undisturbed():
             circumstances = Circumstances((record(),), tuple(not_run), tuple(repeats))
-            written = save_report(
-                target, report, jobs, runner.backends.name, outcomes, others, circumstances, drawings.problems()
-            )
+            written = save_report(target, report, jobs, outcomes, others, circumstances, drawings.problems())
     stdout.writelines(f"{printable(problem)}\n" for problem in written.problems)
     if said is not Verbosity.QUIET or not written.is_whole:
         stdout.write(f"{written.sentence}\n")

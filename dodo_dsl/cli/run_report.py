@@ -1,8 +1,9 @@
 """The end of a run: its summary, its report on disk, and the history of its tests."""
 
 import itertools
+import re
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -14,16 +15,18 @@ from dodo_dsl.cli.progress import count
 from dodo_dsl.diagnostics import Piece, shown_path
 from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.report import comparison, results
-from dodo_dsl.report.instances import decisive_limits, decisive_value, worst_instances
+from dodo_dsl.report import checks, overview, results
+from dodo_dsl.report.files import LOGS, PAGE
+from dodo_dsl.report.instances import compared
 from dodo_dsl.report.next_report import NextReport
-from dodo_dsl.report.report_folder import Drawable, write_report
-from dodo_dsl.report.viewer.names import LOGS, PAGE
+from dodo_dsl.report.report_folder import Drawable, write_summaries
+from dodo_dsl.report.results import Circumstances, GivenReport
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.history import History
 from dodo_dsl.terminal import cells, clipped, printable, width_of
 
 _MOST_NAMES = 5
+_REPEATED = re.compile(r"(\[(run=\d+|sample=\d+,[^\]]*)\])+$")
 _MOST_COMPLAINTS = 20
 """Of one service of a test."""
 _INDENT = len("PASSED  ")
@@ -77,7 +80,7 @@ def write_summary(
         _write_details(stream, outcome, verbosity, about.get(outcome.slug), width)
     stream.write(blank)
     if not is_quiet:
-        stream.writelines(f"{printable(worst.in_words())}\n" for worst in worst_instances(outcomes))
+        stream.writelines(f"{printable(one.in_words())}\n" for one in compared(outcomes))
     if len(set(tests.values())) < len(tests):
         stream.writelines(f"{line}\n" for line in _rates(outcomes, tests))
     display.write_coloured(stream, _counts(outcomes))
@@ -89,17 +92,17 @@ def write_summary(
 
 
 def _table(passed: Sequence[Outcome], width: int | None) -> Iterator[list[Piece]]:
-    """A heading, then a row for each test: its own time, the wall time of set-up and drive, and its smallest margin."""
+    """A heading, then a row for each test: its own time, the real time of set-up and drive, and its decisive check."""
     if not passed:
         return
     most = None if width is None else max(_NARROWEST_NAME, width - _BESIDE_NAME)
     names = max((len(o.name) for o in passed if most is None or len(o.name) <= most), default=_NARROWEST_NAME)
-    heading = f"{'':{_INDENT}}{'test':<{names}}  {'time':>7}  {'wall':>7}  smallest margin"
+    heading = f"{'':{_INDENT}}{'test':<{names}}  {'time':>7}  {'real':>7}  closest to failing"
     yield [(clipped(heading, width) + "\n", "gutter")]
     for outcome in passed:
-        wall = None if outcome.execution_s is None else (outcome.setup_s or 0.0) + outcome.execution_s
+        real = None if outcome.execution_s is None else (outcome.setup_s or 0.0) + outcome.execution_s
         own = outcome.execution_s if outcome.sim_s is None else outcome.sim_s
-        figures = "  ".join(("" if seconds is None else f"{seconds:.1f} s").rjust(7) for seconds in (own, wall))
+        figures = "  ".join(("" if seconds is None else f"{seconds:.1f} s").rjust(7) for seconds in (own, real))
         name = printable(outcome.name)
         if len(name) > names:
             name += f"\n{'':{_INDENT + names}}"
@@ -110,10 +113,10 @@ def _table(passed: Sequence[Outcome], width: int | None) -> Iterator[list[Piece]
 
 def _margin(outcome: Outcome, room: int | None) -> str:
     """The check nearest to its limit, with the limit if there is room; the verdict's sentence if none has one."""
-    value = decisive_value(outcome)
-    limit = decisive_limits(outcome)
-    whole = printable(f"{value} ({limit})" if limit else value or outcome.reason)
-    return clipped(whole if room is None or cells(whole) <= room or not value else printable(value), room)
+    check = checks.decisive(outcome)
+    whole = printable(checks.in_words(check) if check else outcome.reason)
+    short = printable(f"{check['name']} {checks.measured(check)}") if check else whole
+    return clipped(whole if room is None or cells(whole) <= room else short, room)
 
 
 def _times(outcome: Outcome) -> str:
@@ -148,9 +151,9 @@ def _write_details(
         display.write_coloured(stream, _wrapped(text, width))
 
     is_verbose = verbosity is Verbosity.VERBOSE
-    failed = [c for c in outcome.checks if not c["ok"] and not comparison.only_follows(c, outcome.checks)]
+    failed = [c for c in outcome.checks if not c["ok"] and not checks.only_follows(c, outcome.checks)]
     for check in outcome.checks if is_verbose else failed:
-        say(comparison.check_line(check, outcome.checks))
+        say(checks.check_line(check, outcome.checks))
     if outcome.outcome != "passed" and about:
         for place in _places(outcome, about.plan, failed):
             stream.write(f"{'':{_INDENT}}in {printable(place)}\n")
@@ -235,20 +238,31 @@ def drawable(job: Job) -> Drawable:
     return Drawable(job.plan, job.folder)
 
 
+def earlier(report: Path, names: Collection[str]) -> GivenReport | None:
+    """What a report has of other tests than those of these names, however often they ran; None if there is none."""
+    ran = {_REPEATED.sub("", name) for name in names}
+    try:
+        found = results.read_given(report)
+    except results.ResultsError:
+        return None
+    kept = [outcome for outcome in found.outcomes if _REPEATED.sub("", outcome.name) not in ran]
+    slugs = {outcome.slug for outcome in kept}
+    repeated = tuple(each for each in found.circumstances.repeated if each.test in slugs)
+    return GivenReport(found.file, kept, Circumstances(found.circumstances.runs, repeated=repeated)) if kept else None
+
+
 def save_report(
     target: NextReport,
     shown: Path,
     jobs: Sequence[Job],
-    backend: str,
     outcomes: Sequence[Outcome],
-    others: Sequence[Outcome],
-    circumstances: results.Circumstances,
-    drawn: Mapping[str, Sequence[str]],
+    others: GivenReport | None,
+    circumstances: Circumstances,
+    problems: list[str],
 ) -> WrittenReport:
     """Puts the report of these jobs in its place, which is ``shown`` to users; ``others`` are of an earlier run.
 
-    ``drawn`` are the slugs of tests that are drawn already, with sentences on problems. Where no test began, the report
-    before stays.
+    ``problems`` are sentences on what could not be drawn. Where no test began, the report before stays.
     """
     if not outcomes and circumstances.not_run and (target.place / results.FILE_NAME).is_file():
         return WrittenReport(
@@ -257,14 +271,14 @@ def save_report(
     tests = {job.plan.slug: job.test for job in jobs}
     history = History()
     history.add((tests[outcome.slug], outcome) for outcome in outcomes)
-    times = history.times({(job.plan.spec, job.test) for job in jobs}, backend)
     past = {o.slug: history.checks(o.spec, tests[o.slug], o.backend, o.clock) for o in outcomes}
-    drawables = {job.plan.slug: drawable(job) for job in jobs}
+    reports = [GivenReport(target.place / results.FILE_NAME, outcomes, circumstances), *([others] if others else [])]
+    every = [outcome for one in reports for outcome in one.outcomes]
+    kept = {outcome.slug for outcome in (others.outcomes if others else ())}
     try:
-        target.link_others()
-        every = [*outcomes, *others]
-        problems = write_report(target.folder, every, drawables, times, past, circumstances, target.place, drawn)
-        gone = target.take_place()
+        before = {slug: runs for slug, runs in overview.read_history(target.place).items() if slug in kept}
+        gone = target.take_place([outcome.slug for outcome in outcomes], kept)
+        write_summaries(target.place, every, results.joined(reports), past={**before, **past})
     except Exception as error:  # noqa: BLE001  (the outcomes are printed)
         why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
         target.stays = True
@@ -272,5 +286,6 @@ def save_report(
         return WrittenReport(f"'{shown}' cannot take the whole report: {why}\n{left}".rstrip("\n"), is_whole=False)
     finally:
         history.save()
+    beside = f", with {count(len(kept), 'test')} of earlier runs" if kept else ""
     instead = f"; it replaces an earlier one with {count(gone, 'other test')}" if gone else ""
-    return WrittenReport(f"report: {shown / 'index.html'}{instead}", problems)
+    return WrittenReport(f"report: {shown / 'index.html'}{beside}{instead}", problems)

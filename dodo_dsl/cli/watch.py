@@ -150,10 +150,11 @@ class Watch:
             runner = cli_run.runner_of(self._options, chosen, deployment, self._stdout, load)
             slugs = {job.plan.slug for job in jobs} - {job.plan.slug for job in chosen}
             others = [outcome for slug, outcome in self.outcomes.items() if slug in slugs]
+            kept = GivenReport(BEFORE, others) if others else None
             with reserved(self._options.report, self._stdout):
                 report, said = self._options.report, self._options.verbosity
                 source = origin(self._options, deployment)
-                outcomes, _, _ = cli_run.run(runner, chosen, report, self._stdout, source, others, said)
+                outcomes, _, _ = cli_run.run(runner, chosen, report, self._stdout, source, kept, said)
         self._show_change(outcomes)
         self.outcomes = {outcome.slug: outcome for outcome in [*others, *outcomes]}
         return runner.interrupted

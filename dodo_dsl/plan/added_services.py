@@ -147,7 +147,7 @@ def recorder(test: ResolvedTest, manifest: Manifest, image: str, cid: int) -> Pl
     flags = [Flag("rec", RECORDING, "report"), Flag("commands", "false")]  # the application could stop it
     flags += [Flag("limit", f"{spec.record_limit_mb:g}")] if spec.record_limit_mb else []
     wanted = list(_pictures(test))
-    wanted += [Flag("snapshot", SNAPSHOT, "report")] if spec.level == "hil" else []
+    wanted += [Flag("snapshot", SNAPSHOT, "report")] if spec.level == "hil" or spec.kind == "perception" else []
     memories = ",".join(_memories(test.services)) if wanted else ""
     if memories:
         flags += [*wanted, Flag("memories", memories, "memories")]

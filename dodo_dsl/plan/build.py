@@ -192,6 +192,7 @@ class _Builder:
             world=check_senders.services(self.test, tuple(service.name for service in automatic)),
             told=tuple(dict.fromkeys(str(end.port) for end in check_senders.told(self.test.wiring))),
             goals=resolved_goals(self.test)[0],
+            headline=spec.headline,
             import_paths=self.shared.imports,
             source_map=self.places,
         )

@@ -151,7 +151,7 @@ class Plan:
     ``lockstep`` is None in real time, ``rig`` empty below level hil, ``emulated`` says whether it is; ``more_tags`` are
     its runner's besides ``tag``; ``pool`` is None for a test that names its rig; ``messages`` are ODVD files of the
     deployment, relative to ``files/``; ``senders`` has the only senders of a message, as ``opendlv.sim.Frame/0=pose``.
-    ``goals`` score a passed test and never change its outcome.
+    ``goals`` score a passed test and never change its outcome; the report shows the check ``headline`` first.
     ``truth`` are messages by which evaluators judge, which the application never gets.
     ``world`` are the services that get what the application must not hear, and those of the deployment with what they
     consume of it, as ``judge?=opendlv.sim.Frame/0``; ``told`` is what the application declares to take of it, and gets.
@@ -187,6 +187,7 @@ class Plan:
     world: tuple[str, ...] = ()
     told: tuple[str, ...] = ()
     goals: tuple[Goal, ...] = ()
+    headline: str = ""
     import_paths: tuple[str, ...] = ()
     shared: dict[str, str] = field(default_factory=dict)
     source_map: dict[str, Place] = field(default_factory=dict)

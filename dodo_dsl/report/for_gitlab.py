@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.outcome import NotRun, Outcome, worst_margin
-from dodo_dsl.report import comparison
+from dodo_dsl.report import checks
 from dodo_dsl.report.results import RunRecord
 from dodo_dsl.report.viewer import moment
 from dodo_dsl.terminal import printable
@@ -62,7 +62,7 @@ def _case(outcome: Outcome, attachment: str | None, link: str | None) -> Any:
         result.text = _plain("\n".join([outcome.reason, *replay, *outcome.last_lines]))
         case.result = [result]
     # GitLab shows the text of a failure in place of this, and takes the attachment from here
-    said = [comparison.check_line(check, outcome.checks) for check in outcome.checks] + [
+    said = [checks.check_line(check, outcome.checks) for check in outcome.checks] + [
         f"note: {note}" for note in outcome.notes
     ]
     lines = [_plain(line) for line in said]

@@ -1,14 +1,14 @@
-"""The instances of a matrix beside each other: a grid of parameters by outcome, and the worst of them."""
+"""The instances of a matrix beside each other: a grid of parameters, in which one check is compared."""
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from dodo_dsl.outcome import Outcome, differs_each_run, worst_margin
-from dodo_dsl.report import comparison
-from dodo_dsl.report.comparison import only_follows, with_margins
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.report import checks
+from dodo_dsl.report.checks import Check
 
 _CHOICE = re.compile(r"(?P<before>.*)\[(?P<choice>[^\[\]]+)\]")
 _NEXT = re.compile(r",(?=[a-z][a-z0-9-]*=)")
@@ -46,64 +46,64 @@ def grids(outcomes: Sequence[Outcome]) -> list[MatrixGrid]:
     return [grid for name, instances in found.items() for grid in _grid(name, instances)]
 
 
-def decisive_value(outcome: Outcome) -> str:
-    """The first check that failed, or else the one with the least margin, with its value; empty without one.
-
-    As for a test's margin, checks that cannot be better do not count.
-    """
-    check = decisive(outcome)
-    return f"{check['name']} {comparison.value_text(check['value'], check.get('unit') or '')}" if check else ""
-
-
-def decisive_limits(outcome: Outcome) -> str:
-    """The limits of that check in words; empty without one."""
-    check = decisive(outcome)
-    return ", ".join(comparison.limits(check)) if check else ""
-
-
-def decisive(outcome: Outcome) -> Mapping[str, Any] | None:
-    """The check whose value ``decisive_value`` shows."""
-    checks = outcome.checks
-    failed = (check for check in checks if not check["ok"] and not only_follows(check, checks))
-    judged = (c for c in map(with_margins, checks) if c["margin_share"] and not differs_each_run(c["name"]))
-    return next(failed, None) or min(judged, key=lambda check: check["margin_share"], default=None)
-
-
-class WorstInstance(NamedTuple):
-    """The instance of a ``test`` that has the least margin, and how many of its ``number`` instances passed."""
+class Compared(NamedTuple):
+    """The instances of a ``test`` by one check, the ``worst`` of them, and how many passed."""
 
     test: str
-    outcome: Outcome
+    check: str
+    worst: Outcome
     passed: int
     number: int
 
     @property
     def choice(self) -> str:
         """``[light=dark]``"""
-        return self.outcome.name.removeprefix(self.test)
+        return self.worst.name.removeprefix(self.test)
+
+    def of(self, outcome: Outcome) -> Check | None:
+        """The check of an instance, None if it has none."""
+        return _check(outcome, self.check)
 
     def in_words(self) -> str:
         """``dil-course: 2 of 3 passed, worst is [recording=b.rec]: share 0.5 (at least 0.55)``"""
-        value, limits = decisive_value(self.outcome), decisive_limits(self.outcome)
-        told = f": {value}{f' ({limits})' if limits else ''}" if value else ""
+        check = self.of(self.worst)
+        told = f": {checks.in_words(check)}" if check else ""
         return f"{self.test}: {self.passed} of {self.number} passed, worst is {self.choice}{told}"
 
 
-def worst_instances(outcomes: Sequence[Outcome]) -> list[WorstInstance]:
-    """The worst of each matrix with two instances or more, by margin; those in error have none and do not count."""
+def compared(outcomes: Sequence[Outcome]) -> list[Compared]:
+    """Each matrix with two instances or more that have a check with a limit in common.
+
+    The check is the test's headline, or else the one by which an instance is nearest to failing, or failed the most.
+    """
     found: dict[str, list[Outcome]] = defaultdict(list)
     for outcome in outcomes:
         test, choice = _parted(outcome.name)
         if choice.keys() - set(_REPETITIONS):
             found[test].append(outcome)
-    return [worst for test, instances in found.items() for worst in _worst(test, instances)]
+    return [one for test, instances in found.items() for one in _compared(test, instances)]
 
 
-def _worst(test: str, instances: Sequence[Outcome]) -> Iterator[WorstInstance]:
-    margins = [(margin, o) for o in instances if (margin := worst_margin(o)) is not None]
-    if len(instances) > 1 and margins:
-        _, worst = min(margins, key=lambda pair: pair[0])
-        yield WorstInstance(test, worst, sum(o.outcome == "passed" for o in instances), len(instances))
+def _compared(test: str, instances: Sequence[Outcome]) -> Iterator[Compared]:
+    judged = [outcome for outcome in instances if outcome.outcome != "error"]
+    each = [(outcome, check) for outcome in judged for check in outcome.checks]
+    names = {check["name"] for _, check in each if checks.share(check)}
+    names -= {check["name"] for outcome, check in each if checks.only_follows(check, outcome.checks)}
+    names = {name for name in names if all(_check(outcome, name) for outcome in judged)}
+    if len(instances) > 1 and names:
+        headline = next((o.headline for o in judged if o.headline in names), "")
+        name = headline or min(sorted(names), key=lambda name: min(_share(outcome, name) for outcome in judged))
+        worst = min(judged, key=lambda outcome: _share(outcome, name))
+        yield Compared(test, name, worst, sum(o.outcome == "passed" for o in instances), len(instances))
+
+
+def _check(outcome: Outcome, name: str) -> Check | None:
+    return next((check for check in outcome.checks if check["name"] == name), None)
+
+
+def _share(outcome: Outcome, name: str) -> float:
+    check = _check(outcome, name)
+    return (check and checks.share(check)) or 1.0
 
 
 def _parted(name: str) -> tuple[str, dict[str, str]]:

@@ -21,10 +21,9 @@ from markupsafe import Markup, escape
 from dodo_dsl import __version__, atomic, package_data
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import MachineLoad, Outcome, Wait, megabytes, worst_margin
-from dodo_dsl.report import check_display
-from dodo_dsl.report import comparison as report_comparison
-from dodo_dsl.report.comparison import DIRECTIONS, KINDS, Comparison
-from dodo_dsl.report.instances import MatrixGrid, decisive, decisive_value, grids, worst_instances
+from dodo_dsl.report import checks
+from dodo_dsl.report.comparison import KINDS, Comparison
+from dodo_dsl.report.instances import MatrixGrid, compared, grids
 from dodo_dsl.report.results import NO_CIRCUMSTANCES, Circumstances
 from dodo_dsl.template_cache import compiled_templates
 
@@ -100,18 +99,15 @@ def _svg(values: Sequence[float], limits: Sequence[float]) -> Markup:
     step = (_WIDTH - 2 * _EDGE) / (len(values) - 1)
     points = [(round(_EDGE + n * step), y(value)) for n, value in enumerate(values)]
     lines = "".join(f'<line x1="0" x2="{_WIDTH}" y1="{y(limit)}" y2="{y(limit)}"/>' for limit in near)
-    curve_ = " ".join(f"{px},{py}" for px, py in _corners(points))
-    (px, py), text = points[-1], f"last {len(values)} values: {min(values):.4g} to {max(values):.4g}"
+    curve_ = " ".join(f"{px},{py}" for px, py in points)
+    (px, py), text = (
+        points[-1],
+        f"last {len(values)} values: {checks.number(min(values))} to {checks.number(max(values))}",
+    )
     return Markup(  # noqa: S704  (only numbers are in it)
         f'<svg class="curve" role="img" viewBox="0 0 {_WIDTH} {_HEIGHT}"><title>{text}</title>'
         f'{lines}<polyline points="{curve_}"/><circle cx="{px}" cy="{py}" r="2"/></svg>'
     )
-
-
-def _corners(points: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Without those on level stretches between two of the same height: pages with many tests have thousands."""
-    inner = zip(points, points[1:], points[2:], strict=False)
-    return [points[0], *(now for before, now, after in inner if not before[1] == now[1] == after[1]), points[-1]]
 
 
 class ReportPicture(NamedTuple):
@@ -123,19 +119,14 @@ class ReportPicture(NamedTuple):
 
 @dataclass(frozen=True)
 class ReportFiles:
-    """The files next to the page, as paths relative to it, by slug; ``times`` is the path of one picture, or empty.
-
-    ``past`` are earlier values of checks, ``ways`` pictures of drives to put into the page.
-    """
+    """The files next to the page, as paths relative to it, by slug; ``past`` are earlier values of checks."""
 
     pictures: Mapping[str, Sequence[ReportPicture]]
     logs: Mapping[str, Sequence[str]]
     recordings: Mapping[str, str]
     specs: Mapping[str, str]
     drives: Mapping[str, str]
-    times: str = ""
     past: Past = field(default_factory=dict)
-    ways: Mapping[str, Markup] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -201,8 +192,7 @@ def render(
             outcomes=outcomes,
             rows=rows(outcomes),
             files=files,
-            meaning=check_display.meaning,
-            bars=check_display.Bars(),
+            checks=checks,
             branch=branch,
             longest=_MOST_OF_A_LINE,
             repositories=list(repositories.values())[:_MOST_REPOSITORIES],
@@ -215,15 +205,11 @@ def render(
             megabytes=megabytes,
             history=history,
             explained=_explained(outcomes),
-            worst={worst.test: worst for worst in worst_instances(outcomes)},
-            decisive=decisive,
-            decisive_value=decisive_value,
+            compared={one.test: one for one in compared(outcomes)},
             margin=worst_margin,
             comparison=comparison,
             changed=comparison.by_slug() if comparison else {},
-            words=report_comparison,
             kinds=KINDS,
-            directions=DIRECTIONS,
             script=script,
             style=style(),
             hash=source_hash,
@@ -240,7 +226,7 @@ def _explained(outcomes: Sequence[Outcome]) -> dict[str, str]:
     for outcome in outcomes:
         names = [check["name"] for check in outcome.checks]
         for check in outcome.checks:
-            if check["name"] not in found and (words := check_display.meaning(check, names)):
+            if check["name"] not in found and (words := checks.meaning(check, names)):
                 found[check["name"]] = words
     return dict(sorted(found.items()))
 

@@ -7,14 +7,13 @@ folder or its ``results.json``, is untrusted.
 import dataclasses
 import json
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
 
-from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.report.repetitions import Repeated
@@ -65,9 +64,9 @@ class RunRecord:
 
 
 FILE_NAME = "results.json"
-VERSION = 1
-_MAX_PROBLEM_TEXT = 200
-_MOST_DIGITS = 300
+MOST_SLUG = 240
+"""Characters of a slug, which names a folder."""
+_SHOWN_PATH = 60
 
 
 class ResultsError(ValueError):
@@ -121,23 +120,47 @@ class GivenReport:
 
 
 def to_json(outcomes: Sequence[Outcome], circumstances: Circumstances = NO_CIRCUMSTANCES) -> str:
-    tests = [_rounded(dataclasses.asdict(outcome)) for outcome in outcomes]
-    head = {"dodo": "results", "version": VERSION}
+    """What ``load`` reads; a question mark stands for each character that UTF-8 cannot encode."""
     besides = {key: value for key, value in dataclasses.asdict(circumstances).items() if value}
-    return json.dumps({**head, **besides, "tests": tests}, indent=2, ensure_ascii=False) + "\n"
+    tests = [_rounded(dataclasses.asdict(outcome)) for outcome in outcomes]
+    document = {"dodo": "results", "version": 1, **besides, "tests": tests}
+    return json.dumps(document, indent=2, ensure_ascii=False).encode(errors="replace").decode() + "\n"
 
 
-def writable(value: Any) -> Any:
-    """The same with a question mark for each character that UTF-8 cannot encode, as in the names of some files."""
-    if isinstance(value, str):
-        return value.encode(errors="replace").decode()
+@dataclass(frozen=True)
+class JoinedTest:
+    """A test with a slug and name that no other has, and where it comes from."""
+
+    outcome: Outcome
+    report: GivenReport
+    slug: str
+    """In the report that it comes from."""
+
+
+def distinct(reports: Sequence[GivenReport]) -> Iterator[JoinedTest]:
+    """All tests in the order of the reports.
+
+    The first of a slug keeps it and its name; further ones are called ``<slug>--report-2`` and ``<name>[report=2]``,
+    with the next number that is free.
+    """
+    given = [(outcome, report) for report in reports for outcome in report.outcomes]
+    taken, used = {outcome.slug for outcome, _ in given}, set[str]()
+    for outcome, report in given:
+        named, n = outcome, 2
+        while named.slug in used or (n > 2 and named.slug in taken):
+            named = replace(outcome, slug=f"{outcome.slug}--report-{n}", name=f"{outcome.name}[report={n}]")
+            n += 1
+        used.add(named.slug)
+        yield JoinedTest(named, report, outcome.slug)
+
+
+def _rounded(value: Any, name: str = "") -> Any:
+    """Rounds durations and shares to 0.001, which is more than the precision of the measurement."""
     if isinstance(value, dict):
-        return {writable(key): writable(each) for key, each in value.items()}
-    if isinstance(value, tuple):
-        return tuple(map(writable, value))
-    if not dataclasses.is_dataclass(value) or isinstance(value, type):
-        return value
-    return dataclasses.replace(value, **{p.name: writable(getattr(value, p.name)) for p in dataclasses.fields(value)})
+        return {key: _rounded(each, key) for key, each in value.items()}
+    if name == "resources":
+        return [_rounded(use) for use in value]
+    return round(value, 3) if name.endswith(("_s", "_share")) and value is not None else value
 
 
 def joined(each: Sequence[GivenReport]) -> Circumstances:
@@ -150,71 +173,27 @@ def joined(each: Sequence[GivenReport]) -> Circumstances:
     )
 
 
-def _rounded(value: Any, name: str = "") -> Any:
-    """Rounds durations and shares to 0.001, which is more than the precision of the measurement."""
-    if isinstance(value, dict):
-        return {key: _rounded(each, key) for key, each in value.items()}
-    if name == "resources":
-        return [_rounded(use) for use in value]
-    return round(value, 3) if name.endswith(("_s", "_share")) and value is not None else value
-
-
 def load(path: Path) -> list[Outcome]:
-    """The outcomes of a ``results.json`` that is valid; raises ResultsError."""
-    return list(read_results(path).outcomes)
-
-
-def read_results(path: Path) -> GivenReport:
-    """A ``results.json`` that is valid; raises ResultsError."""
-    try:
-        document = json.loads(regular_file.text(path), parse_int=_whole)
-        if document["dodo"] != "results" or document["version"] != VERSION:
-            raise ResultsError(f"{path}: not results of version {VERSION}")
-        found = msgspec.convert(document, Results)
-        _check_keys(document, dataclasses.asdict(found), "$")
-        json.dumps(document, ensure_ascii=False).encode()  # raises for strings that UTF-8 cannot encode
-        if not all(is_goal(goal) for outcome in found.tests for goal in outcome.goals):
-            raise ResultsError(f"{path}: a goal whose numbers make no score")
-        return GivenReport(path, found.tests, Circumstances(found.runs, found.not_run, found.repeated))
-    except FileNotFoundError as error:
-        raise ResultsError(f"there is no {path}") from error
-    except OSError as error:
-        raise ResultsError(f"{path} cannot be read: {error.strerror}") from error
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise ResultsError(f"{path}: not results of DoDo ({error})") from error
-
-
-def _whole(digits: str) -> int | float:
-    """A number as others read it, too: what no float holds is infinite."""
-    return int(digits) if len(digits) < _MOST_DIGITS else float(digits)
-
-
-def _check_keys(value: Any, known: Any, place: str) -> None:
-    """Raises ValueError for a key of a document that no class has: it is not among what was ``known`` of it."""
-    if isinstance(value, dict):
-        for key, below in value.items():
-            if key not in known:
-                hint = did_you_mean(key, known.keys() - value.keys())
-                said = f"{place}: unknown key '{key[:_MAX_PROBLEM_TEXT]}'"
-                raise ValueError(f"{said}; {hint}" if hint.startswith("did") else said)
-            _check_keys(below, known[key], f"{place}.{key}")
-    elif isinstance(value, list):
-        for number, (below, of_known) in enumerate(zip(value, known, strict=True)):
-            _check_keys(below, of_known, f"{place}[{number}]")
-
-
-MOST_SLUG = 240
-"""Characters of a slug, which names a folder."""
-_SHOWN_PATH = 60
+    """The outcomes of the report in a folder, or of a file; raises ResultsError."""
+    return list(read_given(path).outcomes)
 
 
 def read_given(path: Path) -> GivenReport:
     """The report in a folder, or of a file; raises ResultsError, also if a slug could leave its folder."""
     is_file = not path.is_dir() and (path.is_file() or path.suffix == ".json")
     file = path if is_file else path / FILE_NAME
-    found = read_results(file)
-    for outcome in found.outcomes:
+    try:
+        found = msgspec.json.decode(regular_file.content(file), type=Results)
+    except FileNotFoundError as error:
+        raise ResultsError(f"there is no {file}") from error
+    except OSError as error:
+        raise ResultsError(f"{file} cannot be read: {error.strerror}") from error
+    except (ValueError, RecursionError) as error:
+        raise ResultsError(f"{file}: not results of DoDo ({error})") from error
+    if not all(is_goal(goal) for outcome in found.tests for goal in outcome.goals):
+        raise ResultsError(f"{file}: a goal whose numbers make no score")
+    for outcome in found.tests:
         if len(outcome.slug) > MOST_SLUG or not SLUG.fullmatch(outcome.slug):
             shown = outcome.slug[:_SHOWN_PATH]
             raise ResultsError(f"{file}: '{shown}' is not a slug, expected lower-case letters, digits and hyphens")
-    return found
+    return GivenReport(file, found.tests, Circumstances(found.runs, found.not_run, found.repeated))

@@ -1,24 +1,27 @@
-"""The drive in a recording: the vehicle's path over the map's cones and lines."""
+"""The map of a test from above, and the picture of a drive on it."""
 
-import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from dodo_dsl import atomic
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.assets import map_file
 from dodo_dsl.opendlv.assets.problem import InputError
-from dodo_dsl.opendlv.attitude import heading_of
 from dodo_dsl.plan.model import Plan
 
 MAP = "map-path"
 """The parameter of all services that read the test's map."""
-_FRAME = "opendlv.sim.Frame"
 _GREY = 0.5, 0.5, 0.5
 
 Point = tuple[float, float]
+Line = tuple[float, float, float, float]
+Points = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,7 @@ class Ground:
     """The map from above: model positions in metres by colour (RGB, 0 to 1), named lines, and what moves on it."""
 
     models: list[tuple[tuple[float, float, float], list[Point]]] = field(default_factory=list)
-    lines: list[tuple[str, list[tuple[float, float, float, float]]]] = field(default_factory=list)
+    lines: list[tuple[str, list[Line]]] = field(default_factory=list)
     moving: tuple[map_file.ModelEntry, ...] = ()
     """Models at the frames of vehicles."""
 
@@ -40,69 +43,11 @@ class Way:
     width: float = 0.0
     roles: Mapping[str, str] = field(default_factory=dict)
 
-    @property
-    def goal(self) -> str:
-        """The obstacle to be reached; empty if there is none."""
-        return next((name for name, role in self.roles.items() if role == "goal"), "")
-
-
-@dataclass(frozen=True)
-class DrivenPath:
-    """A path in the world frame: x and y in metres, heading in radians, and seconds since its start."""
-
-    path: list[tuple[float, float, float, float]]
-    ground: Ground
-    length: float = 0.0
-    width: float = 0.0
-    goal: str = ""
-
-
-def read_drive(plan: Plan, folder: Path, recording: Path, way: Way) -> DrivenPath | None:
-    """The drive of a test, or None when its recording holds no Frame; ``way`` as its judges recorded it."""
-    paths = _paths(recording) if recording.is_file() else {}
-    path = paths.get(way.frame) or next(iter(paths.values()), [])
-    return DrivenPath(path, ground_of(plan, folder), way.length, way.width, way.goal) if path else None
-
 
 def ground_of(plan: Plan, folder: Path) -> Ground:
     """The map of a test, of which its judges come last; ``folder`` is the compiled test's."""
     maps = [flag.value for service in plan.services for flag in service.flags if flag.name == MAP]
     return read_ground(folder / FILES / maps[-1]) if maps else Ground()
-
-
-def _paths(path: Path) -> dict[int, list[tuple[float, float, float, float]]]:
-    """The path of each sender of frames."""
-    found: dict[int, list[tuple[float, float, float, float]]] = {}
-    for stamp, *pose in _poses(path):
-        x, y, heading, time = pose
-        found.setdefault(stamp, []).append((x, y, heading, time))
-    return found
-
-
-def _poses(path: Path) -> Iterator[tuple[int, float, float, float, float]]:
-    from dodo_dsl.opendlv.message_set import (
-        MessageError,  # protobuf and numpy take longer to load than the compiler
-        MessageSet,
-    )
-    from dodo_dsl.opendlv.recording import Recording
-
-    messages = MessageSet.standard()
-    wanted, begin = messages.id(_FRAME), messages.id("dodo.TestBegin")
-    start: int | None = None
-    with Recording(path) as recording:
-        for envelope in recording.envelopes(recording.rows({wanted, begin})):
-            if envelope.data_type == begin:
-                start = envelope.sample_time
-                continue
-            try:
-                frame: Any = messages.decode(envelope.data_type, envelope.payload)
-            except MessageError:
-                continue
-            heading = heading_of(frame.qx, frame.qy, frame.qz, frame.qw)
-            if heading is None or not math.isfinite(frame.x + frame.y):
-                continue
-            start = envelope.sample_time if start is None else start
-            yield envelope.sender_stamp, frame.x, frame.y, heading, (envelope.sample_time - start) / 1e6
 
 
 def read_ground(place: Path) -> Ground:
@@ -122,10 +67,62 @@ def read_ground(place: Path) -> Ground:
     return Ground(models, lines, moving)
 
 
-def _edges(outlines: Iterable[map_file.Outline]) -> list[tuple[float, float, float, float]]:
+def _edges(outlines: Iterable[map_file.Outline]) -> list[Line]:
     return [(*a, *b) for corners in outlines for a, b in pairwise([*corners, corners[0]])]
 
 
 def colour_of(model: map_file.ModelEntry) -> tuple[float, float, float]:
     """Red, green and blue from 0 to 1; grey for a texture, or materials."""
     return model.paint if isinstance(model.paint, tuple) else _GREY
+
+
+_WIDTH, _HEIGHT, _PAD = 480, 360, 16
+"""Pixels of the picture at most, and around what it shows."""
+_TALL = 1.5
+_SHIFT = 4
+_COLOURS = {
+    "passed": (46, 160, 67), "failed": (229, 83, 75), "error": (191, 135, 0),
+    "wall": (140, 149, 159), "other": (140, 149, 159), "gate": (130, 80, 223), "goal": (47, 129, 247),
+}  # fmt: skip
+"""Of the path by its outcome and of lines by their roles: those that stand out on white and on black."""
+
+
+def draw(target: Path, ground: Ground, way: Way, path: Points, outcome: str) -> None:
+    """The path of ``x`` and ``y`` in m on the map, as a PNG that is transparent elsewhere; raises OSError."""
+    ends = np.array([line for _, lines in ground.lines for line in lines], np.float64).reshape(-1, 2)
+    around = np.concatenate([path, ends])
+    (wide, high), turn = np.ptp(around, axis=0), np.eye(2)
+    if high > _TALL * wide:
+        turn = np.array([[0, -1], [1, 0]])  # pictures are wide
+    around = around @ turn
+    low, size = around.min(axis=0), np.maximum(np.ptp(around, axis=0), 0.5)
+    scale = ((_WIDTH - 2 * _PAD, _HEIGHT - 2 * _PAD) / size).min()
+    width, height = np.rint(size * scale).astype(int) + 2 * _PAD
+    pixels = np.full((height, width, 4), (128, 128, 128, 0), np.uint8)
+
+    def placed(points: object) -> NDArray[np.int32]:
+        from_low = (np.asarray(points, np.float64).reshape(-1, 2) @ turn - low) * scale + _PAD
+        from_low[:, 1] = height - from_low[:, 1]
+        pixel: NDArray[np.int32] = np.rint(np.clip(from_low, -10_000, 10_000) * (1 << _SHIFT)).astype(np.int32)
+        return pixel
+
+    for colour, points in ground.models:
+        for place in placed(points):
+            _dot(pixels, place, 3, tuple(round(255 * part) for part in colour))
+    for name, lines in ground.lines:
+        role = way.roles.get(name, "other")
+        parts = list(placed(lines).reshape(-1, 2, 2))
+        cv2.polylines(pixels, parts, False, _bgra(_COLOURS[role]), 3 if role == "goal" else 2, cv2.LINE_AA, _SHIFT)
+    driven = placed(path)
+    cv2.polylines(pixels, [driven], False, _bgra(_COLOURS[outcome]), 3, cv2.LINE_AA, _SHIFT)
+    _dot(pixels, driven[-1], 6, _COLOURS[outcome])
+    atomic.write_bytes(target, cv2.imencode(".png", pixels)[1].tobytes())
+
+
+def _dot(pixels: NDArray[np.uint8], place: NDArray[np.int32], radius: int, colour: tuple[int, ...]) -> None:
+    x, y = place.tolist()
+    cv2.circle(pixels, (x, y), radius << _SHIFT, _bgra(colour), cv2.FILLED, cv2.LINE_AA, _SHIFT)
+
+
+def _bgra(colour: tuple[int, ...]) -> tuple[int, ...]:
+    return (*reversed(colour), 255)

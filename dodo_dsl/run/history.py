@@ -4,7 +4,9 @@ import contextlib
 import functools
 import json
 import os
+import re
 import statistics
+import subprocess
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -17,6 +19,7 @@ import msgspec
 from dodo_dsl import atomic
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.spec.deployment import FILE_NAME
 from dodo_dsl.state_folder import NoStateFolder, state_path
 
 _MAX_BYTES = 4_000_000
@@ -41,7 +44,7 @@ class PastRun:
     checks: Mapping[str, float] = field(default_factory=dict)
     """Values by name, of names that one check has."""
     repository: str = ""
-    """The folder of the repository that it ran in."""
+    """The repository that it is a test of: its address, or else its folder."""
 
 
 def default_path() -> Path:
@@ -53,9 +56,13 @@ def default_path() -> Path:
 
 
 def _repository() -> str:
-    """The folder of the repository that this runs in, else the working folder."""
+    """The address of this git repository, wherever it is cloned; else the folder with ``dodo.yml``, or this one."""
+    command = ["git", "--no-optional-locks", "-c", "core.fsmonitor=false", "config", "--get", "remote.origin.url"]
+    with contextlib.suppress(OSError, subprocess.SubprocessError):
+        found = subprocess.run(command, capture_output=True, timeout=5, check=True).stdout.decode(errors="replace")
+        return re.sub(r"(?<=://)[^/@]*@", "", found.strip())  # without a token
     here = Path.cwd()
-    return str(next((folder for folder in (here, *here.parents) if (folder / ".git").exists()), here))
+    return str(next((folder for folder in (here, *here.parents) if (folder / FILE_NAME).exists()), here))
 
 
 class History:
@@ -83,16 +90,6 @@ class History:
         """The median time of the latest runs, from the start of set-up to the end; None when the test never ran."""
         took = [run.setup_s + run.execution_s for run in self._alike(spec, test, backend, clock)[-_RECENT:]]
         return statistics.median(took) if took else None
-
-    def times(self, tests: Iterable[tuple[str, str]], backend: str) -> dict[str, list[tuple[float, float]]]:
-        """Seconds of set-up and execution of all runs of ``tests``, which are pairs of spec and name."""
-        found: dict[str, list[tuple[float, float]]] = {}
-        wanted = set(tests)
-        for r in self.runs:
-            if (r.spec, r.test) in wanted and r.backend == backend:
-                name = r.test if r.clock == "realtime" else f"{r.test} ({r.clock})"
-                found.setdefault(name, []).append((r.setup_s, r.execution_s))
-        return found
 
     def checks(self, spec: str, test: str, backend: str, clock: str) -> list[dict[str, Any]]:
         """The latest runs of a test: when they ended, with what, and their checks' values."""

@@ -72,6 +72,7 @@ def outcome_of(plan: Plan, finding: Finding, backend: str, cid: int) -> Outcome:
         clock=plan.clock,
         backend=backend,
         goals=plan.goals,
+        headline=plan.headline,
         decided_by=finding.service if finding.cause == "verdict" and finding.result != "error" else "",
     )
 

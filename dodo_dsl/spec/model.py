@@ -31,7 +31,7 @@ class ResourceLimits:
 
 
 _RESOURCES = ("max-memory", "max-memory-growth", "max-processor-time", "max-processor-share")
-_PLAIN = ("name", "level", "kind", "clock", "rig", "isolation", "pose", "seed", "until")
+_PLAIN = ("name", "level", "kind", "clock", "rig", "isolation", "pose", "seed", "headline", "until")
 _VALUES = (*_PLAIN, "description", "timeout", "record", "response", "resources")
 
 
@@ -104,6 +104,7 @@ class Spec:
     uses: tuple[Use, ...] = ()
     variables: dict[str, Entry] = field(default_factory=dict)
     goals: dict[str, Entry] = field(default_factory=dict)
+    headline: str = ""
     choice: Choice = field(default_factory=Choice)
     spans: dict[str, Span] = field(default_factory=dict)
     is_whole: bool = True

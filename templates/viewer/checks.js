@@ -2,7 +2,7 @@
 "use strict";
 
 dodo.checks = (function () {
-  const { make, withUnit } = dodo.dom;
+  const { make } = dodo.dom;
 
   // The line with the parameters that set the limit marked in it.
   function source(line, flags) {
@@ -35,15 +35,15 @@ dodo.checks = (function () {
 
   function row(check) {
     const meaning = check.meaning ? make("small", {}, check.meaning) : "";
-    if (check.follows) return make("li", {}, make("span", {}, make("b", {}, `– ${check.name}`), ` ${withUnit(check.value, check.unit)}, when the drive ended`), meaning);
+    if (check.follows) return make("li", {}, make("span", {}, make("b", {}, `– ${check.name}`), ` ${check.value}, when the drive ended`), meaning);
     const state = check.ok ? "passed" : "failed";
-    const measured = [withUnit(check.value, check.unit), check.limits.join(", ")].filter(Boolean).join(", expected ");
+    const measured = [check.value, check.limits.join(", ")].filter(Boolean).join(", expected ");
     const name = make("b", {}, `${check.ok ? "✓" : "✗"} ${check.name}`);
     return make("li", { class: state }, make("span", {}, name, ` ${measured}`), check.bar ? bar(check.bar) : "", meaning, ...(check.ok ? [] : places(check)));
   }
 
   function show(parent) {
-    const all = [...dodo.data.test.checks].sort((a, b) => a.ok - b.ok || a.follows - b.follows || (a.value === null) - (b.value === null));
+    const all = [...dodo.data.test.checks].sort((a, b) => a.ok - b.ok || a.follows - b.follows || (a.value === "none") - (b.value === "none"));
     parent.append(make("h2", {}, "Checks"));
     if (!all.length) parent.append(make("p", { class: "nothing" }, "No evaluator measured anything."));
     const judged = all.filter((check) => check.limits.length || !check.ok);

@@ -1,4 +1,4 @@
-// What drive.js holds, unpacked: times and values as arrays of numbers, all times in seconds of the test.
+// What drive.js holds, unpacked, with all times in seconds of the test; and elements with text, never made from HTML.
 "use strict";
 var dodo = {};
 
@@ -18,13 +18,12 @@ dodo.data = (function () {
     return low - 1;
   }
 
-  function unpacked(raw) {
-    const fields = raw.fields.map((field) => ({ name: field.name, values: unpack(field.values) }));
-    return { ...raw, times: unpack(raw.times), fields };
-  }
-
+  const unpacked = (raw) => ({ ...raw, times: unpack(raw.times), fields: raw.fields.map((field) => ({ ...field, values: unpack(field.values) })) });
   const test = window.dodoTest;
   const channels = test.channels.map(unpacked);
+  const box = ([label, x, y, width, height, score]) => ({ label, x, y, width, height, score });
+  const frames = test.frames.map((frame) => ({ ...frame, hit: frame.hit.map(box), false: frame.false.map(box), missed: frame.missed.map(box) }));
+  const frameTimes = Float32Array.from(frames, (frame) => frame.time);
 
   return {
     test,
@@ -33,9 +32,40 @@ dodo.data = (function () {
     bytes,
     unpacked,
     at,
+    frames,
+    frameTimes,
+    frameAt: (time) => frames[at(frameTimes, time + 1e-3)] || null,
     channel: (message, sender) => channels.find((c) => c.message === message && c.sender === sender),
     field: (found, name) => found && found.fields.find((f) => f.name === name),
-    // Messages by the last parts of their names, which distinguish them.
-    short: (message) => message.slice(message.lastIndexOf(".") + 1),
+  };
+})();
+
+dodo.dom = (function () {
+  const SVG = "http://www.w3.org/2000/svg";
+
+  function filled(element, attributes, children) {
+    for (const [name, value] of Object.entries(attributes || {})) {
+      if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+      else if (value !== false && value != null) element.setAttribute(name, value === true ? "" : value);
+    }
+    element.append(...children.filter((child) => child != null && child !== ""));
+    return element;
+  }
+
+  // Three digits, of whole numbers all of them.
+  function number(value) {
+    if (value === null || value === undefined || Number.isNaN(value)) return "none";
+    const size = Math.abs(value);
+    if (size >= 1e7 || (size < 1e-4 && size > 0)) return value.toExponential(2);
+    return String(Number.isInteger(value) || size >= 1000 ? Math.round(value) : Number(value.toPrecision(3)));
+  }
+
+  return {
+    make: (tag, attributes, ...children) => filled(document.createElement(tag), attributes, children),
+    svg: (tag, attributes, ...children) => filled(document.createElementNS(SVG, tag), attributes, children),
+    number,
+    seconds: (value) => `${value.toFixed(2)} s`,
+    withUnit: (value, unit) => (unit && value !== null && !Number.isNaN(value) ? `${number(value)} ${unit}` : number(value)),
+    colour: (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim(),
   };
 })();

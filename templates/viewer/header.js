@@ -1,22 +1,24 @@
-// The head of the page: what became of the test, steps to other failed ones, its command, and the keys.
+// The head of the page: what became of the test, steps to other failed ones, its files and commands, and the time line.
 "use strict";
 
 dodo.header = (function () {
-  const { make } = dodo.dom;
-  const { test } = dodo.data.test;
+  const { cursor } = dodo;
+  const { make, seconds } = dodo.dom;
+  const { test, moment, files, spec } = dodo.data.test;
   const SLUG = /^[a-z0-9-]+$/;
   const failed = (window.dodoFailed || []).filter(([slug]) => SLUG.test(slug));
+  const [STEP, LONG] = [0.1, 1];
   const KEYS = [
     ["space", "play, pause"], ["← →", "0.1 s back or on, with shift 1 s"], ["Home End", "begin, end"],
     ["D", "the moment that decided"], ["N P", "next, previous failed test"], ["?", "these keys"],
   ];
-  const keys = dialog();
+  const keyRows = KEYS.flatMap(([key, what]) => [make("dt", {}, ...key.split(" ").map((each) => make("kbd", {}, each))), make("dd", {}, what)]);
+  const keys = dialog("Keys", make("dl", {}, ...keyRows));
 
   // The failed test so many steps on in the report; null where there is none.
   function other(steps) {
     const own = failed.findIndex(([slug]) => slug === test.slug);
-    const at = own < 0 ? (steps > 0 ? 0 : -1) : own + steps;
-    return failed[at] || null;
+    return failed[own < 0 ? (steps > 0 ? 0 : -1) : own + steps] || null;
   }
 
   function link(steps, text) {
@@ -36,24 +38,82 @@ dodo.header = (function () {
     return `dodo run ${word}${test.seed ? ` --seed ${test.seed}` : ""}`;
   }
 
-  function copier() {
-    const button = make("button", { title: command() }, "Copy command");
-    const said = (text) => {
-      button.textContent = text;
-      setTimeout(() => (button.textContent = "Copy command"), 1500);
+  function copier(name, text) {
+    const button = make("button", { title: text }, name);
+    const said = (word) => {
+      button.textContent = word;
+      setTimeout(() => (button.textContent = name), 1500);
     };
-    button.addEventListener("click", () => copy(command()).then(() => said("Copied"), () => window.prompt("The command", command())));
+    const copy = async () => navigator.clipboard.writeText(text);
+    button.addEventListener("click", () => copy().then(() => said("Copied"), () => window.prompt("The command", text)));
     return button;
   }
 
-  async function copy(text) {
-    await navigator.clipboard.writeText(text);
+  function dialog(name, ...content) {
+    const close = make("button", { onclick: () => made.close() }, "Close");
+    const made = make("dialog", { "aria-label": name }, make("h2", {}, name), ...content, close);
+    document.body.append(made);
+    return made;
   }
 
-  function dialog() {
-    const rows = KEYS.flatMap(([key, what]) => [make("dt", {}, ...key.split(" ").map((each) => make("kbd", {}, each))), make("dd", {}, what)]);
-    const close = make("button", { onclick: () => keys.close() }, "Close");
-    return make("dialog", { "aria-label": "Keys" }, make("h2", {}, "Keys"), make("dl", {}, ...rows), close);
+  function opener(name, title, made) {
+    return make("button", { title, onclick: () => made.showModal() }, name);
+  }
+
+  function links() {
+    const found = files.map((file) => make("a", { href: file, download: file }, file));
+    if (dodo.data.test.log.lines.length) found.push(make("a", { href: "logs/" }, "logs"));
+    if (spec) found.push(opener("Spec", test.spec, dialog(test.spec, make("pre", { tabindex: "0" }, spec))));
+    const mcap = `dodo rec export ${test.slug}/test.rec --mcap -o ${test.slug}.mcap`;
+    return files.includes("test.rec") ? [...found, copier("Copy MCAP command", mcap)] : found;
+  }
+
+  function pressed(event) {
+    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("select, input[type=search], dialog")) return;
+    const size = event.shiftKey ? LONG : STEP;
+    const actions = {
+      ArrowLeft: () => cursor.move(cursor.time() - size),
+      ArrowRight: () => cursor.move(cursor.time() + size),
+      Home: () => cursor.move(0),
+      End: () => cursor.move(cursor.last),
+      " ": () => cursor.toggle(),
+      d: () => cursor.move(moment.time),
+      n: () => step(1),
+      p: () => step(-1),
+      "?": () => keys.showModal(),
+    };
+    if (event.key === " " && event.target.closest("button, summary")) return;
+    if (!Object.hasOwn(actions, event.key)) return;
+    event.preventDefault();
+    actions[event.key]();
+  }
+
+  function transport(parent) {
+    const button = (text, title, action) => make("button", { title, "aria-label": title, onclick: action }, text);
+    const play = button("▶", "Play (space)", () => cursor.toggle());
+    const slider = make("input", { type: "range", min: 0, max: cursor.last, step: 0.01, "aria-label": "Time of the test in seconds" });
+    slider.addEventListener("input", () => cursor.move(Number(slider.value)));
+    const mark = make("span", { class: `mark ${test.outcome}`, title: `Decided at ${seconds(moment.time)}: ${moment.what}` });
+    mark.style.setProperty("--share", moment.time / cursor.last);
+    const speed = make("select", { "aria-label": "Speed" }, ...[0.1, 0.25, 0.5, 1, 2, 5].map((each) => make("option", { value: each, selected: each === 1 }, `${each}×`)));
+    speed.addEventListener("change", () => cursor.setSpeed(Number(speed.value)));
+    const time = make("output", {});
+    const jump = { class: "jump", title: `${seconds(moment.time)}: ${moment.what} (D)`, onclick: () => cursor.move(moment.time) };
+    parent.append(
+      play,
+      button("‹", "Back 0.1 s (left arrow; with shift 1 s)", () => cursor.move(cursor.time() - STEP)),
+      button("›", "On 0.1 s (right arrow; with shift 1 s)", () => cursor.move(cursor.time() + STEP)),
+      make("div", { class: "line" }, slider, mark),
+      time,
+      speed,
+      make("button", jump, test.outcome === "passed" ? "Jump to verdict" : "Jump to failure"),
+    );
+    cursor.follow((now) => {
+      slider.value = now;
+      slider.setAttribute("aria-valuetext", seconds(now));
+      time.textContent = `${now.toFixed(2)} / ${seconds(cursor.last)}`;
+    });
+    cursor.whenPlaying((isPlaying) => (play.textContent = isPlaying ? "❚❚" : "▶"));
   }
 
   function show(part) {
@@ -63,11 +123,13 @@ dodo.header = (function () {
     part("facts").textContent = [test.level, test.kind, `${test.clock} clock`, `${test.backend} backend`, `seed ${test.seed}`].join(" · ");
     part("outcome").textContent = test.outcome;
     part("outcome").className = `badge ${test.outcome}`;
-    part("reason").textContent = test.reason;
-    const help = make("button", { title: "Keys (?)", "aria-label": "Keys", onclick: () => keys.showModal() }, "?");
-    part("actions").append(link(-1, "‹ Previous failed"), link(1, "Next failed ›"), copier(), help);
-    document.body.append(keys);
+    part("reason").textContent = test.title;
+    part("reason").title = test.reason;
+    part("files").append(...links());
+    part("actions").append(link(-1, "‹ Previous failed"), link(1, "Next failed ›"), copier("Copy command", command()), opener("?", "Keys (?)", keys));
+    if (dodo.data.test.duration > 0) transport(part("transport"));
+    document.addEventListener("keydown", pressed);
   }
 
-  return { show, step, command, help: () => keys.showModal() };
+  return { show, command };
 })();

@@ -4,9 +4,10 @@
 dodo.log = (function () {
   const { make } = dodo.dom;
   const { services, lines, left } = dodo.data.test.log;
-  const shown = { text: "", service: "", errors: false, ready: false };
-  const times = lines.map(([time]) => time);
-  const timed = times.filter((time) => time !== null);
+  // What a choice hides: lines of the level "info" are those that DoDo's own services say in passing.
+  const LEVELS = [["info", "Without DoDo's INFO"], ["", "All lines"], ["info,", "Warnings and errors"], ["info,,warning", "Errors"]];
+  const shown = { text: "", service: "", hidden: ["info"] };
+  const times = Float32Array.from(lines.map(([time]) => time).filter((time) => time !== null));
   let rows = [];
   let current = -1;
 
@@ -18,9 +19,7 @@ dodo.log = (function () {
   }
 
   function isShown([, service, level, text]) {
-    const isFound = !shown.text || text.toLowerCase().includes(shown.text);
-    if (level === "ready" && !shown.ready) return false;
-    return isFound && (!shown.service || services[service] === shown.service) && (!shown.errors || level === "error");
+    return !shown.hidden.includes(level) && (!shown.service || services[service] === shown.service) && (!shown.text || text.toLowerCase().includes(shown.text));
   }
 
   function filter(list) {
@@ -30,7 +29,7 @@ dodo.log = (function () {
 
   // The last line that is shown until a time; one without a time is never current.
   function follow(list, time, isFiltered) {
-    let n = dodo.data.at(timed, time + 0.005);
+    let n = dodo.data.at(times, time + 0.005);
     while (n >= 0 && rows[n].classList.contains("hidden")) n--;
     if (n === current && !isFiltered) return;
     if (current >= 0) rows[current].classList.remove("now");
@@ -46,14 +45,10 @@ dodo.log = (function () {
     search.addEventListener("input", () => ((shown.text = search.value.toLowerCase()), filter(list)));
     const choice = make("select", { "aria-label": "Service" }, make("option", { value: "" }, "All services"), ...services.map((name) => make("option", {}, name)));
     choice.addEventListener("change", () => ((shown.service = choice.value), filter(list)));
-    const errors = make("input", { type: "checkbox" });
-    errors.addEventListener("change", () => ((shown.errors = errors.checked), filter(list)));
-    const count = lines.filter(([, , level]) => level === "error").length;
-    const quiet = make("input", { type: "checkbox" });
-    quiet.addEventListener("change", () => ((shown.ready = quiet.checked), filter(list)));
-    const hidden = lines.filter(([, , level]) => level === "ready").length;
-    const ready = hidden ? make("label", { title: "What services of DoDo say before the test begins" }, quiet, ` Ready (${hidden})`) : "";
-    return [search, choice, make("label", {}, errors, ` Errors (${count})`), ready];
+    const count = (hidden) => lines.filter(([, , level]) => !hidden.includes(level)).length;
+    const level = make("select", { "aria-label": "Level" }, ...LEVELS.map(([hides, name]) => make("option", { value: hides }, `${name} (${count(hides ? hides.split(",") : [])})`)));
+    level.addEventListener("change", () => ((shown.hidden = level.value ? level.value.split(",") : []), filter(list)));
+    return [search, choice, level];
   }
 
   function show(parent) {

@@ -2,15 +2,18 @@
 "use strict";
 
 (function () {
-  const { moment } = dodo.data.test;
+  const { test, moment, channels } = dodo.data.test;
   const part = (id) => document.getElementById(id);
   dodo.header.show(part);
-  if (dodo.data.test.duration > 0) dodo.transport.show(part("transport"));
   dodo.camera.show(part("scene"));
   dodo.map.show(part("scene"));
-  const isBare = !part("scene").firstChild && dodo.data.channels.every((each) => each.message.startsWith("dodo."));
+  const isBare = !part("scene").firstChild && channels.every((each) => each.message.startsWith("dodo."));
   document.body.classList.toggle("unrecorded", isBare);
-  dodo.signals.show(part("signals"));
+  // A program that ended explains itself in its log.
+  const isCrash = test.lastLines.length > 0 && test.outcome !== "passed";
+  if (isCrash) part("scene").before(part("log"));
+  document.body.classList.toggle("crashed", isCrash);
+  dodo.plots.show(part("signals"));
   dodo.log.show(part("log"));
   dodo.checks.show(part("checks"));
   dodo.cursor.move(dodo.cursor.linked() ?? moment.time);

@@ -25,8 +25,9 @@ _ERROR = re.compile(
 )
 _WARNING = re.compile(r"\bwarn(ing)?\b", re.I)
 _APPLICATION = "application"
-READY = "ready"
-"""What services of DoDo say before a test begins, as a line and as its level: the page hides these at first."""
+READY, INFO = "ready", "info"
+"""What services of DoDo say before a test begins, and the level of this and of all that they say in passing."""
+_IN_PASSING = re.compile(r"^(ready$|[\w.-]+: (INFO|DEBUG)\b)")
 
 
 class LogLine(NamedTuple):
@@ -43,7 +44,9 @@ def merged(folder: Path, test: RecordedTest) -> dict[str, Any]:
     lines = [line for log in sorted(folder.glob("*.log")) for line in _lines(log, test)]
     timed = [line.time for line in lines if line.time is not None]
     if min(map(abs, timed), default=0.0) > FAR:  # no message has both clocks; a test begins once all are ready
-        begin = max((each.time for each in lines if each.level == READY and each.time), default=min(timed))
+        begin = max(
+            (each.time for each in lines if each.text == READY and each.level == INFO and each.time), default=min(timed)
+        )
         lines = [line._replace(time=line.time and line.time - begin) for line in lines]
     lines.sort(key=lambda line: float("inf") if line.time is None else line.time)
     left = max(len(lines) - MOST_LINES, 0)
@@ -59,7 +62,7 @@ def merged(folder: Path, test: RecordedTest) -> dict[str, Any]:
 def complaints(folder: Path) -> Iterator[LogLine]:
     """The errors and warnings in the logs of a test, service by service and without times."""
     for log in sorted(folder.glob("*.log")):
-        yield from (line for _, line in _without_times(log) if line.level not in ("", READY))
+        yield from (line for _, line in _without_times(log) if line.level not in ("", INFO))
 
 
 def _lines(log: Path, test: RecordedTest) -> Iterator[LogLine]:
@@ -80,7 +83,7 @@ def _without_times(log: Path) -> Iterator[tuple[int, LogLine]]:
             continue
         level = _level(line, level)
         length = f" … ({len(raw)} bytes)" if len(line) > _MOST_TEXT else ""
-        kind = READY if line == READY and layer != _APPLICATION else level
+        kind = INFO if not level and layer != _APPLICATION and _IN_PASSING.match(line) else level
         yield offset, LogLine(None, name or layer, kind, shown(line[:_MOST_TEXT]) + length)
 
 

@@ -1,9 +1,11 @@
 """A test's page: the data of its drive, the lines of the spec that set each limit, and what all pages share."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from dodo_dsl import atomic, package_data
 from dodo_dsl.emit.output_folder import FILES
@@ -21,17 +23,17 @@ from dodo_dsl.outcome import (
     SLOW_ANSWERS,
     Outcome,
 )
-from dodo_dsl.plan.added_services import PICTURES_FILE, RECORDING
+from dodo_dsl.plan.added_services import RECORDING
 from dodo_dsl.plan.model import Place, Plan, PlannedService
-from dodo_dsl.report import comparison
-from dodo_dsl.report.check_display import meaning
-from dodo_dsl.report.check_display import place as bar_place
+from dodo_dsl.report import checks as words
+from dodo_dsl.report import trajectory
+from dodo_dsl.report.files import BEFORE, DATA, FAILED, FAILED_VARIABLE, LOGS, PAGE, SHARED, TRAJECTORY
 from dodo_dsl.report.trajectory import Ground, Way, colour_of, ground_of
-from dodo_dsl.report.viewer import log_lines, moment, pictures, recorded
+from dodo_dsl.report.viewer import log_lines, moment, pictures, recorded, units
 from dodo_dsl.report.viewer.encoded import packed, script, shown
-from dodo_dsl.report.viewer.names import BEFORE, DATA, LOGS, PAGE, SHARED
+from dodo_dsl.report.viewer.pictures import Replayed, Video
 from dodo_dsl.report.viewer.record import read
-from dodo_dsl.report.viewer.recorded import Channel, RecordedTest
+from dodo_dsl.report.viewer.recorded import FRAME, Channel, RecordedTest
 
 _OF_THE_TEST = {SLOW_ANSWERS: "max", SAMPLE_TIMES: "sample-times"}
 """Checks of no evaluator, and the key of the test's ``response`` that asks for them."""
@@ -62,6 +64,10 @@ class SpecLines:
         lines = self._files[place.file]
         return shown(lines[place.line - 1].strip(), 400) if 0 < place.line <= len(lines) else ""
 
+    def text(self, file: str) -> str:
+        """All lines of a file; empty if it cannot be read."""
+        return "\n".join(shown(line) for line in self._read(file))
+
     def _read(self, name: str) -> list[str]:
         for root in self._roots:
             path = root / name
@@ -80,14 +86,12 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters)
         places = list(limit_places(plan, check["name"], recorded)) if check.get("limit") else []
         yield {
             "name": shown(check["name"], 100),
-            "value": check["value"],
-            "limits": [shown(words, 80) for words in comparison.limits(check)],
-            "unit": shown(check.get("unit") or "", 40),
+            "value": shown(words.measured(check), 80),
+            "limits": [shown(limit, 80) for limit in words.limits(check)],
             "ok": bool(check["ok"]),
-            "follows": comparison.only_follows(check, outcome.checks),
-            "margin": check.get("margin"),
-            "meaning": shown(meaning(check, names), 200),
-            "bar": bar_place(check),
+            "follows": words.only_follows(check, outcome.checks),
+            "meaning": shown(words.meaning(check, names), 200),
+            "bar": words.bar_place(check),
             "places": [
                 {"file": shown(place.file, 400), "line": place.line, "text": lines.line(place), "flag": flag}
                 for flag, place in places
@@ -120,73 +124,93 @@ def _parameters(service: PlannedService, check: str, recorded: Parameters) -> li
     return [name for name in named if name in own]
 
 
-VERSION = 3
-FRAME = "opendlv.sim.Frame"
+VERSION = 4
 _MOST = 20_000
 """Points and lines of a map that are drawn."""
-_WITHOUT_RECORDS = 2
-"""A version whose evaluators recorded nothing: the report itself worked out what they judged."""
-_OF_BEFORE_RECORDS = "Evaluators of the DoDo that made this report did not record what they judged over time."
 _OF_BEFORE = f'<script defer src="{BEFORE}"></script>\n'
 
 
-def write_shared(report: Path) -> None:
-    """What all pages of a report use; raises OSError. Nothing is written through a symlink."""
+def write_shared(report: Path, outcomes: Sequence[Outcome]) -> None:
+    """What all pages of a report use, and which of its ``outcomes`` with a page did not pass; raises OSError.
+
+    Nothing is written through a symlink.
+    """
     if (report / SHARED).is_symlink():
         (report / SHARED).unlink()
     for source in sorted(_sources().iterdir()):
         if source.name != PAGE:
             atomic.write_bytes(report / SHARED / source.name, source.read_bytes())
+    failed = [[o.slug, shown(o.name), o.outcome] for o in outcomes if o.outcome != "passed"]
+    atomic.write_text(report / SHARED / FAILED, script(failed, FAILED_VARIABLE))
 
 
 def write(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> None:
     """The page of a test in its folder of the report; ``compiled`` is the compiled test's. Raises OSError."""
-    atomic.write_text(folder / DATA, script(document(folder, outcome, plan, compiled)))
+    messages = _messages(plan, compiled)
+    recording = folder / RECORDING
+    test = recorded.read(recording, messages) if recording.is_file() else RecordedTest()
+    record = read(plan, folder / LOGS)
+    ground, way = ground_of(plan, compiled), record.way or Way()
+    path = _path(test, way.frame)
+    if len(path):
+        trajectory.draw(folder / TRAJECTORY, ground, way, path, outcome.outcome)
+    decisive = moment.decisive(outcome, test.duration)
+    videos = list(pictures.write(folder, list(_replayed(plan, compiled)), test, messages))
+    for video in [each for each in videos if isinstance(each, Video)][:1]:
+        pictures.write_frame(folder, video, decisive.time)
+    if outcome.level != "hil":
+        pictures.shrink_snapshot(folder)
+    lines = SpecLines()
+    document = {
+        "version": VERSION,
+        "test": _facts(outcome),
+        "spec": lines.text(outcome.spec),
+        "files": [path.name for path in sorted(folder.glob("*.rec"))],
+        "duration": test.duration,
+        "moment": dataclasses.asdict(decisive),
+        "checks": list(checks(plan, outcome, lines, record.parameters)),
+        "scene": scene(ground, way),
+        "log": log_lines.merged(folder / LOGS, test),
+        "channels": [_channel(channel) for channel in test.channels],
+        "frames": record.frames(test.begin),
+        "videos": [{"problem": each} if isinstance(each, str) else dataclasses.asdict(each) for each in videos],
+        "judged": record.series(test.begin),
+        "messages": record.messages,
+        "why": record.why() if test.channels else "",
+    }
+    atomic.write_text(folder / DATA, script(document))
     write_html(folder)
 
 
 def write_html(folder: Path) -> None:
-    """The page alone: the same for all tests, but for whether there is a way to compare with. Raises OSError."""
+    """The page alone: the same for all tests, but for whether there is a path to compare with. Raises OSError."""
     text = (_sources() / PAGE).read_text(encoding="utf-8")
     if not (folder / BEFORE).is_file():
         text = text.replace(_OF_BEFORE, "")
     atomic.write_text(folder / PAGE, text)
 
 
-def document(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> dict[str, Any]:
-    """All that the page shows, as a JSON value whose keys are fixed."""
-    messages = _messages(plan, compiled)
-    recording = folder / RECORDING
-    test = recorded.read(recording, messages) if recording.is_file() else RecordedTest()
-    record = read(plan, folder / LOGS)
-    return {
-        "version": VERSION,
-        "test": _facts(outcome),
-        "duration": test.duration,
-        "moment": dataclasses.asdict(moment.decisive(outcome, test.duration)),
-        "checks": list(checks(plan, outcome, SpecLines(), record.parameters)),
-        "scene": scene(plan, compiled, record.way or Way()),
-        "log": log_lines.merged(folder / LOGS, test),
-        "channels": [_channel(channel) for channel in test.channels],
-        "frames": record.frames(test.begin),
-        "videos": _videos(folder, test, messages),
-        "judged": record.series(test.begin),
-        "messages": record.messages,
-        "why": record.why() if test.channels else "",
-    }
+def _path(test: RecordedTest, sender: int) -> trajectory.Points:
+    """Where the vehicle was, in m; nothing without positions."""
+    frames = [channel for channel in test.channels if channel.message == FRAME]
+    for channel in [*(c for c in frames if c.sender == sender), *frames]:
+        path = np.stack([channel.numbers("x"), channel.numbers("y")], axis=1)
+        if len(path := path[np.isfinite(path).all(axis=1)]):
+            return path
+    return np.empty((0, 2))
 
 
-def of_today(document: dict[str, Any]) -> dict[str, Any]:
-    """What a page of an earlier version holds, as one of today's: without limits where no evaluator recorded them."""
-    if document["version"] != _WITHOUT_RECORDS:
-        return document
-    nothing = {"version": VERSION, "frames": [], "judged": [], "messages": []}
-    return {**document, **nothing, "why": f"{_OF_BEFORE_RECORDS} No limits, targets and boxes are drawn."}
+def _replayed(plan: Plan, compiled: Path) -> Iterator[Replayed]:
+    """The recordings whose frames a test plays."""
+    for service in plan.services:
+        flags = {flag.name: flag.value for flag in service.flags}
+        if "video-sender" in flags or service.uses == "rec-replay":
+            begin, end = float(flags.get("start", 0)), float(flags.get("end", "inf"))
+            yield Replayed(compiled / FILES / flags["rec"], int(flags.get("video-sender", 0)), begin, end)
 
 
-def scene(plan: Plan, folder: Path, way: Way) -> dict[str, Any]:
-    """The map under the test's path, as its judges see it; ``folder`` is the compiled test's."""
-    ground = ground_of(plan, folder)
+def scene(ground: Ground, way: Way) -> dict[str, Any]:
+    """The map under the test's path, as its judges see it."""
     return {
         "models": [{"colour": list(colour), "points": points[:_MOST]} for colour, points in ground.models],
         "lines": [
@@ -225,15 +249,11 @@ def _facts(outcome: Outcome) -> dict[str, Any]:
     texts = ("name", "slug", "level", "kind", "outcome", "reason", "description", "clock", "backend", "spec")
     return {
         **{name: shown(getattr(outcome, name)) for name in texts},
+        "title": shown(words.title(outcome)),
         "notes": [shown(note) for note in outcome.notes],
         "lastLines": [shown(line) for line in outcome.last_lines],
         "seed": outcome.seed,
     }
-
-
-def _videos(folder: Path, test: RecordedTest, messages: MessageSet) -> list[dict[str, Any]]:
-    found = pictures.write(folder, [folder / RECORDING, folder / PICTURES_FILE], test, messages)
-    return [{"problem": each} if isinstance(each, str) else dataclasses.asdict(each) for each in found]
 
 
 def _channel(channel: Channel) -> dict[str, Any]:
@@ -243,5 +263,13 @@ def _channel(channel: Channel) -> dict[str, Any]:
         "sender": channel.sender,
         "every": channel.every,
         "times": packed(channel.times),
-        "fields": [{"name": name, "values": packed(values)} for name, values in numbers.items()],
+        "fields": [
+            {
+                "name": name,
+                "title": units.title(channel.message, name, channel.sender),
+                "unit": units.unit(channel.message, name),
+                "values": packed(values),
+            }
+            for name, values in numbers.items()
+        ],
     }

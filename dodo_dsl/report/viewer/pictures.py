@@ -1,5 +1,6 @@
 """The camera's frames of a recording as a video that browsers play, without encoding them again."""
 
+import contextlib
 import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -11,12 +12,15 @@ from dodo_dsl import atomic
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.picture_size import too_large
 from dodo_dsl.opendlv.recording import Recording, RecordingError
-from dodo_dsl.report.viewer.names import VIDEOS
+from dodo_dsl.plan.added_services import PICTURES_FILE, RECORDING, SNAPSHOT
+from dodo_dsl.report.files import FRAME, VIDEOS
 from dodo_dsl.report.viewer.recorded import MICROSECONDS, PICTURES, RecordedTest
 
 MOST_BYTES = 32_000_000
 """Of all videos of a test, in equal parts; the oldest frames are left out."""
 _FORMATS = ("h264", "H264")
+ANNOUNCED = "opendlv.proxy.ImageReadingShm"
+_WIDTH, _SAME = 320, 1e-3
 _START, _IDR, _SET = b"\x00\x00\x01", 5, 7
 
 
@@ -36,13 +40,32 @@ class Video:
     """Frames before them that are left out."""
 
 
-def write(folder: Path, recordings: Sequence[Path], test: RecordedTest, messages: MessageSet) -> Iterator[Video | str]:
-    """A video in ``folder`` of each camera in a test's recordings, a few at most, or a sentence on why not."""
-    cameras = [(path, sender) for path in recordings for sender in _senders(path, messages)]
-    cameras = cameras[: len(VIDEOS)]
-    for (path, sender), name in zip(cameras, VIDEOS, strict=False):
+@dataclass(frozen=True)
+class Replayed:
+    """A recording whose part from ``begin`` to ``end``, in s since its first message, a test played with its frames."""
+
+    path: Path
+    sender: int
+    begin: float
+    end: float
+
+
+Images = list[tuple[int, Any]]
+"""Sample times in us and messages of one camera, each later than the one before."""
+
+
+def write(
+    folder: Path, replayed: Sequence[Replayed], test: RecordedTest, messages: MessageSet
+) -> Iterator[Video | str]:
+    """A video in ``folder`` of each camera in a test's recordings, a few at most, or a sentence on why not.
+
+    Of a test that recorded none, they are those that it ``replayed``.
+    """
+    paths = [folder / RECORDING, folder / PICTURES_FILE]
+    cameras = [_images(path, sender, messages) for path in paths for sender in _senders(path, messages)]
+    cameras = (cameras or [found for each in replayed if (found := _played(each, test, messages))])[: len(VIDEOS)]
+    for images, name in zip(cameras, VIDEOS, strict=False):
         try:
-            images = _images(path, sender, messages)
             yield _write(folder / name, images, test.begin, MOST_BYTES // len(cameras))
         except NoVideo as problem:
             yield str(problem)
@@ -58,25 +81,23 @@ def _senders(recording: Path, messages: MessageSet) -> list[int]:
         return []
 
 
-def _write(target: Path, images: Sequence[tuple[int, Any]], begin: int, most_bytes: int) -> Video:
+def _write(target: Path, images: Images, begin: int, most_bytes: int) -> Video:
     kept = _kept(images, most_bytes)
     if not kept:
-        raise NoVideo("none of the recorded pictures stands alone, so none can be shown")
+        raise NoVideo("none of the recorded frames stands alone, so none can be shown")
     first = kept[0][1]
     if first.format not in _FORMATS:
-        raise NoVideo(f"recorded pictures of format '{first.format[:40]}' are not shown, expected h264")
+        raise NoVideo(f"recorded frames of format '{first.format[:40]}' are not shown, expected h264")
     if problem := too_large(first.width, first.height):
-        raise NoVideo(f"the recorded pictures are not shown: {problem}")
+        raise NoVideo(f"the recorded frames are not shown: {problem}")
     with atomic.replacing(target) as part:
         _mux(part, [(time, image.data) for time, image in kept])
     times = [round((time - begin) / MICROSECONDS, 4) for time, _ in kept]
     return Video(target.name, first.width, first.height, times, len(images) - len(kept))
 
 
-def _images(recording: Path, sender: int, messages: MessageSet) -> list[tuple[int, Any]]:
-    """Sample times in us and messages of one camera, each later than the one before."""
-    images = list[tuple[int, Any]]()
-    id_ = messages.id(PICTURES)
+def _images(recording: Path, sender: int, messages: MessageSet) -> Images:
+    images, id_ = Images(), messages.id(PICTURES)
     with Recording(recording) as opened:
         for envelope in opened.envelopes(opened.rows({id_}, sender_stamps={sender})):
             if not images or envelope.sample_time > images[-1][0]:
@@ -84,7 +105,51 @@ def _images(recording: Path, sender: int, messages: MessageSet) -> list[tuple[in
     return images
 
 
-def _kept(images: Sequence[tuple[int, Any]], most_bytes: int) -> Sequence[tuple[int, Any]]:
+def _played(replayed: Replayed, test: RecordedTest, messages: MessageSet) -> Images:
+    """The frames of a recording at the times at which the test announced them, one after the other."""
+    announced = test.channel(ANNOUNCED, replayed.sender)
+    try:
+        images = _images(replayed.path, replayed.sender, messages)
+        with Recording(replayed.path) as opened:
+            first = int(opened.index["time"].min()) if len(opened.index) else 0
+    except (OSError, RecordingError):
+        return []
+    played = [image for image in images if replayed.begin <= (image[0] - first) / MICROSECONDS <= replayed.end]
+    times = [] if announced is None or announced.every > 1 else announced.times.tolist()
+    return [(test.begin + round(t * MICROSECONDS), image) for t, (_, image) in zip(times, played, strict=False)]
+
+
+def shrink_snapshot(folder: Path) -> None:
+    """Makes the small picture of the recorder's snapshot, if there is one and no other; raises OSError."""
+    import cv2
+
+    pixels = cv2.imread(str(folder / SNAPSHOT)) if (folder / SNAPSHOT).is_file() else None
+    if pixels is not None:
+        if not (folder / FRAME).exists():
+            small = cv2.resize(pixels, (_WIDTH, round(_WIDTH * pixels.shape[0] / pixels.shape[1])))
+            atomic.write_bytes(folder / FRAME, cv2.imencode(".jpg", small)[1].tobytes())
+        (folder / SNAPSHOT).unlink()
+
+
+def write_frame(folder: Path, video: Video, time: float) -> None:
+    """The last frame of a video until a time, as a small picture; nothing if it cannot be decoded. Raises OSError."""
+    import av
+    import cv2
+
+    wanted, picture = max(time - video.times[0], 0.0), None
+    with contextlib.suppress(av.FFmpegError), av.open(str(folder / video.file)) as container:
+        container.seek(round(wanted * av.time_base))
+        for frame in container.decode(video=0):
+            if picture is not None and (frame.time or 0.0) > wanted + _SAME:
+                break
+            picture = frame
+        if picture is not None:
+            height = round(_WIDTH * video.height / video.width)
+            pixels = picture.to_ndarray(format="bgr24", width=_WIDTH, height=height)
+            atomic.write_bytes(folder / FRAME, cv2.imencode(".jpg", pixels)[1].tobytes())
+
+
+def _kept(images: Images, most_bytes: int) -> Images:
     """The newest of them that fit, from one that stands alone on."""
     size, first = 0, len(images)
     for number in range(len(images) - 1, -1, -1):
@@ -110,7 +175,7 @@ def _mux(path: Path, packets: Sequence[tuple[int, bytes]]) -> None:
     try:
         import av
     except ImportError:
-        raise NoVideo("recorded pictures are not shown, as the package 'av' is not installed") from None
+        raise NoVideo("recorded frames are not shown, as the package 'av' is not installed") from None
     begin = packets[0][0]
     try:
         with (
@@ -125,4 +190,4 @@ def _mux(path: Path, packets: Sequence[tuple[int, bytes]]) -> None:
                 packet.is_keyframe = _stands_alone(data)
                 container.mux(packet)
     except av.FFmpegError as error:
-        raise NoVideo(f"the recorded pictures are not shown: {error}") from None
+        raise NoVideo(f"the recorded frames are not shown: {error}") from None

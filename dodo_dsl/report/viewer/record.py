@@ -4,32 +4,73 @@ An evaluator of someone's own records as the shipped ones do, and nothing here k
 """
 
 import base64
-import json
-import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from dodo_dsl.log_times import JUDGED_SUFFIX
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.report import comparison
+from dodo_dsl.report import checks
 from dodo_dsl.report.trajectory import Way
 from dodo_dsl.report.viewer.encoded import packed, shown
 from dodo_dsl.report.viewer.recorded import MICROSECONDS, Values
+from dodo_dsl.report.viewer.units import UNITS
 
-_KINDS = ("hit", "false", "missed")
+_BOX = {"hit": 6, "false": 5, "missed": 5}
+"""Kinds of boxes, and how many texts and numbers each has after its kind."""
 _ROLES = ("wall", "gate", "goal")
 _MOST_BYTES = 16 << 20
 
 
+class Line(msgspec.Struct):
+    """A line of a record: what it is, the key says that it has of ``series`` to ``parameters``."""
+
+    series: str | None = None
+    samples: str | None = None
+    target: str | None = None
+    message: str | None = None
+    frames: list[tuple[int, bool, list[list[str | float]]]] | None = None
+    way: Way | None = None
+    parameters: dict[str, tuple[str, ...]] = {}
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    distance: float | None = None
+    band: float | None = None
+    exclusive: bool = False
+    zero: float = 0.0
+    times: bytes = b""
+    values: bytes = b""
+    marks: bytes = b""
+    sender: int | None = None
+    cut: int = 0
+
+    def about(self, evaluator: str) -> dict[str, Any]:
+        """A plot without its samples."""
+        name = shown(self.series, 200)
+        unit = shown(self.unit, 40) or UNITS.get(name.partition(" ")[0], "")
+        notes = [f"band ±{self.band:.4g}"] if self.band is not None else []
+        notes += [checks.bound("min", self.low, unit, self.exclusive)] if self.low is not None else []
+        notes += [checks.bound("max", self.high, unit, self.exclusive)] if self.high is not None else []
+        notes += [f"distance {checks.bound('max', self.distance, unit)}"] if self.distance is not None else []
+        limits = {name: getattr(self, name) for name in ("low", "high", "distance", "band")}
+        return {"evaluator": shown(evaluator, 80), "name": name, "unit": unit, **limits, "note": ", ".join(notes)}
+
+    def part(self) -> tuple[Values, Values, bytes]:
+        """Times in us of the test, values and marks."""
+        times, values = (np.frombuffer(data, "<f4").astype(np.float64) for data in (self.times, self.values))
+        if not len(times) == len(values) == len(self.marks):
+            raise ValueError("parts of different lengths")
+        return self.zero + times * MICROSECONDS, values, self.marks
+
+
 @dataclass
 class _Series:
-    """A plot, and the parts of its samples and its target: times in us of the test, values, marks."""
-
     about: dict[str, Any]
     samples: list[tuple[Values, Values, bytes]] = field(default_factory=list)
     target: list[tuple[Values, Values, bytes]] = field(default_factory=list)
@@ -46,7 +87,7 @@ class JudgedRecord:
     parameters: dict[str, dict[str, tuple[str, ...]]] = field(default_factory=dict)
     silent: list[str] = field(default_factory=list)
     messages: list[dict[str, Any]] = field(default_factory=list)
-    is_cut: bool = False
+    cut: int = 0
     _series: dict[tuple[str, str], _Series] = field(default_factory=dict)
     _frames: dict[int, dict[str, Any]] = field(default_factory=dict)
 
@@ -66,40 +107,29 @@ class JudgedRecord:
         """Why something may be missing, in a sentence; else empty."""
         if self.silent:
             names = " and ".join(f"'{shown(name, 80)}'" for name in self.silent)
-            its = "its" if len(self.silent) == 1 else "their"
-            return f"{names} recorded nothing of what was judged over time: {its} limits and targets are not drawn."
-        return f"Only the first {sum(map(_count, self._frames.values())):,} boxes are drawn." if self.is_cut else ""
+            return f"{names} recorded no time series, so no limits and targets are plotted."
+        return f"Only the first {self.cut:,} boxes are drawn." if self.cut else ""
 
-    def take(self, service: str, line: Mapping[str, Any]) -> None:
-        """A line of a record; raises what a malformed one leads to."""
-        if "series" in line:
-            self._series[service, line["series"]] = _Series(_about(service, line))
-        elif "samples" in line:
-            self._series[service, line["samples"]].samples.append(_part(line))
-        elif "target" in line:
-            self._series[service, line["target"]].target.append(_part(line))
-        elif "message" in line:
-            sender = line["sender"]
-            self.messages.append(
-                {"message": shown(line["message"], 100), "sender": None if sender is None else int(sender)}
-            )
-        elif "frames" in line:
-            self._take_frames(line)
-        elif "way" in line:
-            self.way = self.way or _way(line["way"])
-        elif "parameters" in line:
-            self.parameters[service] = {check: tuple(map(str, names)) for check, names in line["parameters"].items()}
-
-    def _take_frames(self, line: Mapping[str, Any]) -> None:
-        self.is_cut = self.is_cut or "cut" in line
-        for time, is_known, boxes in line["frames"]:
-            frame = self._frames.setdefault(
-                _time(time),
-                {"isKnown": bool(is_known), "hit": list[Any](), "false": list[Any](), "missed": list[Any]()},
-            )
-            for kind, label, *numbers in boxes:
-                if kind in _KINDS and len(numbers) == (5 if kind == "hit" else 4):
-                    frame[kind].append([shown(label, 60), *map(_finite, numbers)])
+    def take(self, service: str, line: Line) -> None:
+        """A line of a record; raises KeyError and ValueError for one that does not fit the lines before."""
+        if line.series is not None:
+            self._series[service, line.series] = _Series(line.about(service))
+        elif line.samples is not None:
+            self._series[service, line.samples].samples.append(line.part())
+        elif line.target is not None:
+            self._series[service, line.target].target.append(line.part())
+        elif line.message is not None:
+            self.messages.append({"message": shown(line.message, 100), "sender": line.sender})
+        elif line.way and not self.way:
+            roles = {name: role for name, role in line.way.roles.items() if role in _ROLES}
+            self.way = replace(line.way, roles=roles)
+        self.parameters |= {service: line.parameters} if line.parameters else {}
+        self.cut = self.cut or line.cut
+        for time, is_known, boxes in line.frames or ():
+            frame = self._frames.setdefault(time, {"isKnown": is_known, **{kind: list[Any]() for kind in _BOX}})
+            for kind, *box in boxes:
+                if isinstance(kind, str) and len(box) == _BOX.get(kind) and isinstance(box[0], str):
+                    frame[kind].append([shown(box[0], 60), *map(float, box[1:])])
 
 
 def read(plan: Plan, logs: Path) -> JudgedRecord:
@@ -112,55 +142,21 @@ def read(plan: Plan, logs: Path) -> JudgedRecord:
             for line in lines:
                 try:
                     found.take(service.name, line)
-                except (ValueError, TypeError, KeyError, AttributeError, OverflowError):
+                except (ValueError, KeyError):
                     continue
     return found
 
 
-def _lines(path: Path) -> Iterator[dict[str, Any]]:
+def _lines(path: Path) -> Iterator[Line]:
     try:
-        texts = regular_file.text(path, _MOST_BYTES).splitlines()
-    except (OSError, ValueError):
+        texts = regular_file.content(path, _MOST_BYTES).splitlines()
+    except OSError:
         return
     for text in texts:
         try:
-            line = json.loads(text)
+            yield msgspec.json.decode(text, type=Line)
         except (ValueError, RecursionError):
             continue
-        if isinstance(line, dict):
-            yield line
-
-
-def _about(service: str, line: Mapping[str, Any]) -> dict[str, Any]:
-    low, high, distance, band = (_number(line.get(key)) for key in ("low", "high", "distance", "band"))
-    unit, exclusive = shown(line.get("unit") or "", 40), bool(line.get("exclusive"))
-    limits = [
-        "" if band is None else f"band ±{band:.4g}",
-        "" if low is None else comparison.bound("min", low, unit, exclusive),
-        "" if high is None else comparison.bound("max", high, unit, exclusive),
-        "" if distance is None else f"distance {comparison.bound('max', distance)}",
-    ]
-    return {
-        "evaluator": shown(service, 80),
-        "name": shown(line["series"], 200),
-        "unit": unit,
-        "low": low,
-        "high": high,
-        "distance": distance,
-        "band": band,
-        "note": ", ".join(filter(None, limits)),
-    }
-
-
-def _part(line: Mapping[str, Any]) -> tuple[Values, Values, bytes]:
-    times, values = (
-        np.frombuffer(base64.b64decode(line[key], validate=True), "<f4").astype(np.float64)
-        for key in ("times", "values")
-    )
-    marks = base64.b64decode(line["marks"], validate=True)
-    if not len(times) == len(values) == len(marks):
-        raise ValueError("parts of different lengths")
-    return float(line["zero"]) + times * MICROSECONDS, values, marks
 
 
 def _columns(parts: list[tuple[Values, Values, bytes]], begin: int) -> dict[str, Any]:
@@ -173,31 +169,3 @@ def _columns(parts: list[tuple[Values, Values, bytes]], begin: int) -> dict[str,
         "values": packed(values[order]),
         "marks": base64.b64encode(marks[order].tobytes()).decode(),
     }
-
-
-def _way(raw: Mapping[str, Any]) -> Way:
-    roles = {str(name): role for name, role in raw["roles"].items() if role in _ROLES}
-    return Way(int(raw["frame"]), _finite(raw["length"]), _finite(raw["width"]), roles)
-
-
-def _number(value: Any) -> float | None:
-    return None if value is None else _finite(value)
-
-
-def _finite(value: Any) -> float:
-    number = float(value)
-    if not math.isfinite(number):
-        raise ValueError("not a finite number")
-    return number
-
-
-def _time(value: Any) -> int:
-    """In us, as messages have it."""
-    time = int(value)
-    if abs(time) >= 1 << 63:
-        raise ValueError("no time")
-    return time
-
-
-def _count(frame: Mapping[str, Any]) -> int:
-    return sum(len(frame[kind]) for kind in _KINDS)

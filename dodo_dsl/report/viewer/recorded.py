@@ -21,6 +21,7 @@ MOST_SAMPLES = 20_000
 MOST_CHANNELS = 200
 FAR = 86_400.0
 """s from the start of the test, beyond which a time is of another clock."""
+FRAME = "opendlv.sim.Frame"
 PICTURES = "opendlv.proxy.ImageReading"
 """Whose data is not read here."""
 _BEGIN, _END = "dodo.TestBegin", "dodo.RecordingEnd"

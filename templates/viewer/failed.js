@@ -1,2 +1,0 @@
-// Overwritten in each report: the tests that did not pass.
-var dodoFailed = [];
