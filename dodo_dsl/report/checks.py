@@ -35,7 +35,9 @@ def number(value: float, digits: int = _DIGITS) -> str:
     if value == int(value):
         return str(int(value))
     decimals = digits - 1 - math.floor(math.log10(abs(value)))
-    return f"{value:.{digits}g}" if decimals > digits + 1 else f"{value:.{max(decimals, 0)}f}".rstrip("0").rstrip(".")
+    if decimals > digits + 1:
+        return f"{value:.{digits}g}"
+    return f"{value:.{decimals}f}".rstrip("0").rstrip(".") if decimals > 0 else f"{value:.0f}"
 
 
 def value_text(value: float | None, unit: str) -> str:

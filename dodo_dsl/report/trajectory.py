@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -89,6 +88,8 @@ _COLOURS = {
 
 def draw(target: Path, ground: Ground, way: Way, path: Points, outcome: str) -> None:
     """The path of ``x`` and ``y`` in m on the map, as a PNG that is transparent elsewhere; raises OSError."""
+    import cv2  # which takes longer to load than the rest of a page
+
     ends = np.array([line for _, lines in ground.lines for line in lines], np.float64).reshape(-1, 2)
     around = np.concatenate([path, ends])
     (wide, high), turn = np.ptp(around, axis=0), np.eye(2)
@@ -106,22 +107,21 @@ def draw(target: Path, ground: Ground, way: Way, path: Points, outcome: str) -> 
         pixel: NDArray[np.int32] = np.rint(np.clip(from_low, -10_000, 10_000) * (1 << _SHIFT)).astype(np.int32)
         return pixel
 
+    def dot(place: NDArray[np.int32], radius: int, colour: tuple[int, ...]) -> None:
+        x, y = place.tolist()
+        cv2.circle(pixels, (x, y), radius << _SHIFT, _bgra(colour), cv2.FILLED, cv2.LINE_AA, _SHIFT)
+
     for colour, points in ground.models:
         for place in placed(points):
-            _dot(pixels, place, 3, tuple(round(255 * part) for part in colour))
+            dot(place, 3, tuple(round(255 * part) for part in colour))
     for name, lines in ground.lines:
         role = way.roles.get(name, "other")
         parts = list(placed(lines).reshape(-1, 2, 2))
         cv2.polylines(pixels, parts, False, _bgra(_COLOURS[role]), 3 if role == "goal" else 2, cv2.LINE_AA, _SHIFT)
     driven = placed(path)
     cv2.polylines(pixels, [driven], False, _bgra(_COLOURS[outcome]), 3, cv2.LINE_AA, _SHIFT)
-    _dot(pixels, driven[-1], 6, _COLOURS[outcome])
+    dot(driven[-1], 6, _COLOURS[outcome])
     atomic.write_bytes(target, cv2.imencode(".png", pixels)[1].tobytes())
-
-
-def _dot(pixels: NDArray[np.uint8], place: NDArray[np.int32], radius: int, colour: tuple[int, ...]) -> None:
-    x, y = place.tolist()
-    cv2.circle(pixels, (x, y), radius << _SHIFT, _bgra(colour), cv2.FILLED, cv2.LINE_AA, _SHIFT)
 
 
 def _bgra(colour: tuple[int, ...]) -> tuple[int, ...]:

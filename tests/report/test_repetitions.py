@@ -98,7 +98,7 @@ def test_results_hold_them(tmp_path: Path) -> None:
     text = results.to_json([FIRST], circumstances)
     jsonschema.validate(json.loads(text), json.loads((package_data.schemas() / "results.schema.json").read_text()))
     (tmp_path / "results.json").write_text(text)
-    read = results.read_results(tmp_path / "results.json")
+    read = results.read_given(tmp_path / "results.json")
     assert read.circumstances.repeated[0].differing[0].values == ("reached it", "?")
     assert results.joined([read, read]).repeated == 2 * read.circumstances.repeated
     assert "repeated" not in results.to_json([FIRST])

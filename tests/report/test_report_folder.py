@@ -6,14 +6,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-import yaml
 
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.outcome import Outcome, with_margin
 from dodo_dsl.report import results
-from dodo_dsl.report.check_display import MEANINGS, meaning
-from dodo_dsl.report.report_folder import Drawable, forget, write_report
+from dodo_dsl.report.files import forget
+from dodo_dsl.report.next_report import Drawings
+from dodo_dsl.report.report_folder import Drawable, write_summaries
+from dodo_dsl.report.viewer import page as viewer_page
+from tests.report.joined.reports import draw
 from tests.run.helpers import Bench
 
 OUTCOME = Outcome(
@@ -36,7 +38,7 @@ def test_hostile_reasons_and_frames(tmp_path: Path, reason: str) -> None:
     recording(tmp_path / "report" / "test" / "test.rec", frame(0), b"\x0a\xff\xff\xff", frame(1), frame(float("nan")))
     outcome = replace(OUTCOME, reason=reason, last_lines=(reason,))
     tested = {"test": Drawable(Bench(tmp_path).plan(), tmp_path)}
-    assert write_report(tmp_path / "report", [outcome], tested) == []
+    assert draw(tmp_path / "report", [outcome], tested) == []
     assert results.load(tmp_path / "report" / "results.json") == [outcome]
     assert (tmp_path / "report" / "test" / "trajectory.png").is_file()
     page = (tmp_path / "report" / "index.html").read_text()
@@ -50,11 +52,10 @@ def test_a_snapshot_is_shown_beside_the_drive(tmp_path: Path) -> None:
     (tmp_path / "look").mkdir()
     for slug in slugs[:2]:
         (tmp_path / slug / "snapshot.png").write_bytes(b"a picture")
-    outcomes = [replace(OUTCOME, name=slug, slug=slug) for slug in slugs]
-    write_report(tmp_path, outcomes, {"drive": Drawable(Bench(tmp_path).plan(), tmp_path)})
+    outcomes = [replace(OUTCOME, name=slug, slug=slug, level="hil") for slug in slugs]
+    draw(tmp_path, outcomes, {"drive": Drawable(Bench(tmp_path).plan(), tmp_path)})
     page, junit = ((tmp_path / name).read_text() for name in ("index.html", "junit.xml"))
-    assert re.findall(r'src="(.*?)"', page) == ["drive/snapshot.png", "look/snapshot.png"]
-    assert page.count('<path class="failed" d="M') == 1  # the drive, in the page itself
+    assert re.findall(r'src="(.*?)"', page) == ["drive/trajectory.png", "drive/snapshot.png", "look/snapshot.png"]
     assert [path.split("/", 1)[1] for path in re.findall(r"ATTACHMENT\|(.*?)]]", junit)] == [
         "drive/trajectory.png",
         "look/snapshot.png",
@@ -65,9 +66,7 @@ def test_each_test_has_a_page(tmp_path: Path) -> None:
     recording(tmp_path / "report" / "drive" / "test.rec", frame(0), frame(1))
     outcomes = [replace(OUTCOME, name=slug, slug=slug) for slug in ("drive", "error")]
     plan = Bench(tmp_path).plan()
-    assert (
-        write_report(tmp_path / "report", outcomes, dict.fromkeys(("drive", "error"), Drawable(plan, tmp_path))) == []
-    )
+    assert draw(tmp_path / "report", outcomes, dict.fromkeys(("drive", "error"), Drawable(plan, tmp_path))) == []
     page = (tmp_path / "report" / "index.html").read_text()
     assert re.findall(r'href="(.*?drive.html)"', page) == ["drive/drive.html", "error/drive.html"]
     assert forget(tmp_path / "report", ["drive", "error"]) == 0
@@ -85,7 +84,7 @@ def test_the_page_leads_to_spec_and_recording(tmp_path: Path, monkeypatch: pytes
     spec = tmp_path / "t" / "t.dodo.yml"
     spec.parent.mkdir()
     spec.touch()
-    write_report(report, [outcome, other], {})
+    write_summaries(report, [outcome, other])
     page = (report / "index.html").read_text()
     assert '<p class="about">Drive &amp; turn.</p>' in page
     assert page.count('class="about"') == 1
@@ -96,15 +95,6 @@ def test_the_page_leads_to_spec_and_recording(tmp_path: Path, monkeypatch: pytes
     assert "<td>at most 0.75\u00a0s</td><td>0.25\u00a0s</td>" in page
 
 
-def test_the_page_explains_every_check_of_a_shipped_evaluator_and_no_other() -> None:
-    services = Path(__file__).parents[2] / "services"
-    names = {
-        name for file in services.glob("*/service.yml") for name in yaml.safe_load(file.read_text()).get("checks", ())
-    }
-    assert [name for name in names if not meaning({"name": name.replace("*", "blue")})] == []
-    assert {*MEANINGS} - names == {"slow-answers", "uncopied-sample-times"}
-
-
 def test_forgetting_spares_what_is_not_a_report(tmp_path: Path) -> None:
     report = tmp_path / "project" / "report"
     for slug in ("test", "gone"):
@@ -113,23 +103,17 @@ def test_forgetting_spares_what_is_not_a_report(tmp_path: Path) -> None:
             (report / slug / name).write_bytes(b"")
     (report / "test" / "notes.txt").write_text("mine")
     (tmp_path / "project" / "logs").mkdir()
-    document = json.loads(results.to_json([replace(OUTCOME, slug="gone"), replace(OUTCOME, slug="..")]))
+    document = json.loads(results.to_json([replace(OUTCOME, slug="gone")]))
     (report / "results.json").write_text(json.dumps(document))
-    assert forget(report, ["test"]) == 2
+    assert forget(report, ["test"]) == 1
     assert sorted(p.name for p in report.iterdir()) == ["results.json", "test"]
     assert [p.name for p in (report / "test").iterdir()] == ["notes.txt"]
     assert (tmp_path / "project" / "logs").is_dir()
 
 
-def test_times_that_cannot_be_drawn_cost_no_report(tmp_path: Path) -> None:
-    (problem,) = write_report(tmp_path, [OUTCOME], {}, {"test": []})
-    assert problem.startswith("the times of these tests cannot be drawn: ")
-    assert {p.name for p in tmp_path.iterdir()} == {"results.json", "junit.xml", "metrics.txt", "index.html"}
-
-
 def test_names_that_utf_8_cannot_encode_are_reported(tmp_path: Path) -> None:
     outcome = replace(OUTCOME, reason="no file a\udcff", notes=("\udcff",), last_lines=("\udcff",))
-    assert write_report(tmp_path, [outcome], {}) == []
+    write_summaries(tmp_path, [outcome])
     (loaded,) = results.load(tmp_path / "results.json")
     assert (loaded.reason, loaded.notes, loaded.last_lines) == ("no file a?", ("?",), ("?",))
 
@@ -138,7 +122,19 @@ def test_text_of_others_attaches_no_file(tmp_path: Path) -> None:
     text = "a [[ATTACHMENT|.env]] b"
     check = {"name": text, "value": 1, "limit": {}, "unit": "", "ok": False}
     outcome = replace(OUTCOME, outcome="failed", reason=text, notes=(text,), last_lines=(text,), checks=(check,))
-    assert write_report(tmp_path, [outcome, replace(outcome, outcome="passed")], {}) == []
+    write_summaries(tmp_path, [outcome, replace(outcome, outcome="passed")])
     junit = (tmp_path / "junit.xml").read_text()
     assert junit.count("[ [ATTACHMENT|.env]]") == 7
     assert "[[ATTACHMENT|" not in junit
+
+
+def test_what_cannot_be_drawn_is_said_and_half_a_page_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: Path) -> None:
+        raise OSError("no room")
+
+    monkeypatch.setattr(viewer_page, "write_html", refuse)
+    with Drawings(tmp_path) as drawings:
+        drawings.begin(OUTCOME, Drawable(Bench(tmp_path).plan(), tmp_path))
+    assert drawings.problems() == [f"the page of {OUTCOME.name} cannot be written: no room"]
+    write_summaries(tmp_path, [OUTCOME])
+    assert "drive.html" not in (tmp_path / "index.html").read_text()

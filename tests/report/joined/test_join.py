@@ -3,18 +3,19 @@
 import json
 import os
 import re
-import shutil
 from html import unescape
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from dodo_dsl import atomic
-from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import join as report_join
 from dodo_dsl.report import results
-from dodo_dsl.report.join import join
+from dodo_dsl.report.comparison import compare
+from dodo_dsl.report.join import join, write_other_paths
 from dodo_dsl.report.report_folder import write_summaries
+from dodo_dsl.report.viewer.encoded import packed, script
 from tests.report.joined.reports import PASSED, drive, named, tree, write
 
 
@@ -59,7 +60,7 @@ def test_every_link_leads_to_a_file_of_the_report(tmp_path: Path, jobs: tuple[Pa
     out = tmp_path / "out"
     joined(out, *jobs)
     index = links(out / "index.html")
-    assert len(index) == 4 * 4  # page, recording, log, picture
+    assert len(index) == 4 * 4 + 2  # page, recording, log, picture, and the cells of a matrix
     for page in (out / "index.html", *out.glob("*/drive.html")):
         for link in links(page):
             target = (page.parent / link).resolve()
@@ -72,7 +73,7 @@ def test_a_report_is_replaced_and_files_of_others_stay(tmp_path: Path, jobs: tup
     joined(out, jobs[0])
     (out / "mine.txt").write_text("mine")
     (out / "a" / "mine.txt").write_text("mine")
-    (out / "times.svg").write_text("<svg/>")
+    (out / "history.json").write_text("{}")
     joined(out, jobs[1])
     assert sorted(path.name for path in out.iterdir()) == [
         "_viewer", "a", "b", "c--light-dark", "index.html", "junit.xml", "metrics.txt", "mine.txt", "results.json",
@@ -86,26 +87,16 @@ def test_nothing_else_is_replaced(tmp_path: Path, jobs: tuple[Path, Path]) -> No
     full.mkdir()
     (full / "thesis.tex").write_text("mine")
     joined(report, jobs[0])
-    (report / "c--light-dark").mkdir()
-    (report / "c--light-dark" / "test.rec").write_text("mine")
     link.symlink_to(tmp_path / "new")
     joined(loop, jobs[0])
-    for path in (loop / "_viewer").iterdir():
-        path.unlink()
-    (loop / "_viewer").rmdir()
-    (loop / "_viewer").symlink_to(tmp_path / "full")
+    (loop / "c--light-dark").symlink_to(tmp_path / "full")
     (tmp_path / "file").write_text("mine")
-    joined(tmp_path / "blocked", jobs[0])
-    shutil.rmtree(tmp_path / "blocked" / "a")
-    (tmp_path / "blocked" / "a").write_text("mine")
     before = tree(tmp_path)
     for out, why in (
         (full, "neither a new or empty folder nor a report"),
         (tmp_path / "file", "neither a new or empty folder nor a report"),
-        (report, "not of the report in"),
         (link, "a symlink"),
         (loop, "a symlink"),
-        (tmp_path / "blocked", "not a folder of a report"),
         (jobs[1], "it holds a report that is to be joined"),
     ):
         with pytest.raises(atomic.NotReplaceable, match=why):
@@ -151,13 +142,11 @@ def test_no_symlink_is_followed_and_no_other_file_is_taken(tmp_path: Path) -> No
     (folder / "c" / "logs").symlink_to(tmp_path / "secret")
     out = tmp_path / "out"
     sentences = joined(out, folder)
-    assert [sentence.removeprefix(f"{folder}/") for sentence in sentences] == [
-        "a/test.rec is left out: it is a symlink",
+    assert sorted(sentence.removeprefix(f"{folder}/") for sentence in sentences) == [
+        "a/drive.js is left out with its page: it is a symlink",
         "a/logs/fifo.log is left out: it is not a regular file",
         "a/logs/key.log is left out: it is a symlink",
-        "a/drive.js is left out with its page: it is a symlink",
-        "b is left out: it is a symlink",
-        "c/logs is left out: it is a symlink",
+        "a/test.rec is left out: it is a symlink",
     ]
     assert not any(b"secret" in content for content in tree(out).values())
     assert not (out / "b").exists()
@@ -205,16 +194,12 @@ def test_pages_are_those_of_this_dodo(tmp_path: Path) -> None:
     assert {**tree(tmp_path / "out"), "junit.xml": b""} == {**expected, "junit.xml": b""}
 
 
-def test_what_is_too_large_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_too_large_is_left_out(tmp_path: Path) -> None:
     folder = write(tmp_path / "in", [PASSED])
     with (folder / "test" / "test.rec").open("wb") as file:
         file.truncate(report_join.MOST_BYTES + 1)
-    monkeypatch.setattr(report_join, "MOST_FILES", 3)
-    many, large = joined(tmp_path / "out", folder)
-    assert many == f"{folder}/test has 4 files, of which 1 are left out"
-    assert (
-        large == f"{folder}/test/test.rec is left out: its 17179869185 bytes would make the report larger than 16 GiB"
-    )
+    (large,) = joined(tmp_path / "out", folder)
+    assert large.endswith("/test.rec is left out: its 17179869185 bytes would make the report larger than 16 GiB")
     assert (tmp_path / "out" / "test" / "trajectory.png").is_file()
 
 
@@ -239,10 +224,58 @@ def test_a_failed_join_leaves_the_earlier_report(tmp_path: Path, monkeypatch: py
     joined(out, folder)
     before = tree(tmp_path)
 
-    def full(_outcomes: list[Outcome]) -> str:
+    def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(results, "to_json", full)
+    monkeypatch.setattr(report_join, "script", full)
     with pytest.raises(OSError, match="No space"):
         joined(out, folder)
     assert tree(tmp_path) == before
+
+
+def path_of(**changes: Any) -> dict[str, Any]:
+    fields = [{"name": name, "values": packed([0.0, 1.0])} for name in (*report_join.FIELDS, "more")]
+    channel = {"message": "opendlv.sim.Frame", "sender": 2, "every": 1, "times": packed([0.0, 0.1]), "fields": fields}
+    document = json.loads(drive(PASSED).partition("= ")[2].rstrip(";\n"))
+    frame = {"message": "opendlv.sim.Frame", "sender": 2}
+    return {**document, "scene": {"frame": frame}, "channels": [{**channel, **changes}]}
+
+
+def compared(folder: Path, data: str) -> Path:
+    """The folder of a test, compared with that of a report whose ``drive.js`` has this text."""
+    write(folder / "new", [named("a", outcome="failed"), named("b")])
+    write(folder / "old", [named("a")])
+    (folder / "old" / "a" / "drive.js").write_text(data)
+    given = results.read_given(folder / "old")
+    write_other_paths(folder / "new", compare(results.load(folder / "new"), given), given)
+    return folder / "new" / "a"
+
+
+def test_the_path_is_beside_the_page_until_nothing_is_compared(tmp_path: Path) -> None:
+    place = compared(tmp_path, script(path_of()))
+    document = json.loads((place / "before.js").read_text().removeprefix("var dodoBefore = ").rstrip(";\n"))
+    assert (document["outcome"], document["times"]) == ("passed", packed([0.0, 0.1]))
+    assert [field["name"] for field in document["fields"]] == list(report_join.FIELDS)
+    assert 'src="before.js"' in (place / "drive.html").read_text()
+    assert not (place.parent / "b" / "before.js").exists()
+    write_other_paths(place.parent, None, None)
+    assert not (place / "before.js").exists()
+    assert "before.js" not in (place / "drive.html").read_text()
+
+
+NO_PATH = [
+    "alert(1)",
+    script(path_of()) + "alert(1)",
+    script(path_of(times="<script>")),
+    script(path_of(times=packed([0.0]))),
+    script(path_of(fields=3)),
+    script({**path_of(), "scene": []}),
+    script({**path_of(), "version": 0}),
+]
+
+
+@pytest.mark.parametrize("data", NO_PATH, ids=range(len(NO_PATH)))
+def test_what_is_no_path_is_left_out(tmp_path: Path, data: str) -> None:
+    place = compared(tmp_path, data)
+    assert not (place / "before.js").exists()
+    assert "before.js" not in (place / "drive.html").read_text()

@@ -5,10 +5,9 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.report.comparison import compare
-from dodo_dsl.report.join import join, read_document, write_other_ways
+from dodo_dsl.report.join import join, write_other_paths
 from dodo_dsl.report.report_folder import write_summaries
 from dodo_dsl.report.results import read_given
-from dodo_dsl.report.viewer.encoded import script
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import Chromium
 
@@ -38,45 +37,25 @@ def test_each_drive_is_replayed_from_the_joined_report(chromium: Chromium, tmp_p
 
 @pytest.mark.slow
 @pytest.mark.xdist_group("chromium")
-def test_a_page_without_records_shows_the_drive_and_why_there_are_no_limits(chromium: Chromium, tmp_path: Path) -> None:
-    """Of a DoDo whose report worked out itself what evaluators judge."""
-    folder, out = tmp_path / "report", tmp_path / "out"
-    drives.write(folder, [failures.wall_hit()])
-    data = folder / "test-0" / "drive.js"
-    document = {key: value for key, value in read_document(data).items() if key not in ("messages", "why")}
-    old = {"version": 2, "judged": [{"kind": "margin", "min": 0}], "frames": [{"time": 1, "found": [], "true": None}]}
-    data.write_text(script({**document, **old}))
-    outcomes, said = join([read_given(folder)], out)
-    write_summaries(out, outcomes)
-    assert said == []
-    with chromium.page((out / "test-0" / "drive.html").as_uri()) as page:
-        shown = page.value("document.querySelector('.plots .nothing').textContent")
-        assert shown.endswith("did not record what they judged over time. No limits, targets and boxes are drawn.")
-        assert page.value("[dodo.way.poses.length, dodo.signals.judged().length]") == [322, 0]
-        assert page.faults == []
-
-
-@pytest.mark.slow
-@pytest.mark.xdist_group("chromium")
-def test_the_ways_of_two_reports_are_drawn_over_one_another(chromium: Chromium, tmp_path: Path) -> None:
+def test_the_paths_of_two_reports_are_drawn_over_one_another(chromium: Chromium, tmp_path: Path) -> None:
     (tmp_path / "old").mkdir()
     drives.write(tmp_path / "old" / "report", [failures.timed_out()])
     outcomes = drives.write(tmp_path / "report", [failures.wall_hit()])
     other = read_given(tmp_path / "old" / "report")
     comparison = compare(outcomes, other)
     address = (tmp_path / "report" / "test-0" / "drive.html").as_uri()
-    write_other_ways(tmp_path / "report", comparison, other)
+    write_other_paths(tmp_path / "report", comparison, other)
     with chromium.page(address) as page:
-        assert page.value("dodo.way.before.length") == 4001
+        assert page.value("document.querySelectorAll('.map .earlier').length") == 2
         page.value("dodo.cursor.move(2)")
         caption = page.value("document.querySelector('#scene .caption').textContent")
-        assert caption.endswith("dashed: before (failed), 0.80 m apart")
+        assert caption.endswith("dashed: before (failed), 0.8 m apart")
         assert page.faults == []
         both = page.pixels()
-    write_other_ways(tmp_path / "report", None, None)
+    write_other_paths(tmp_path / "report", None, None)
     with chromium.page(address) as page:
         page.value("dodo.cursor.move(2)")
-        assert page.value("dodo.way.before.length") == 0
+        assert page.value("document.querySelectorAll('.map .earlier').length") == 0
         assert "dashed" not in page.value("document.querySelector('#scene .caption').textContent")
         assert page.faults == []
         assert (page.pixels() != both).any(axis=2).sum() > 500

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import pytest
 
 from dodo_dsl.report import overview
-from dodo_dsl.report.report_folder import write_report, write_summaries
+from dodo_dsl.report.report_folder import write_summaries
 from tests.report.joined.reports import named
 
 CHECK: dict[str, Any] = {"name": "wall-margin", "value": 0.2, "limit": {"min": 0.1}, "unit": "m", "ok": True}
@@ -46,14 +46,13 @@ def test_what_is_no_history_has_no_curve(past: Any) -> None:
 
 def test_the_page_shows_curves_until_another_run_has_none(tmp_path: Path) -> None:
     outcomes = [named("a", checks=(CHECK,)), named("b", checks=(CHECK,))]
-    write_report(tmp_path, outcomes, {}, past={"a": runs(0.1, 0.2)})
+    write_summaries(tmp_path, outcomes, past={"a": runs(0.1, 0.2)})
     for _ in range(2):
         page = (tmp_path / "index.html").read_text()
         assert re.findall(r"<title>(last[^<]*)<", page) == ["last 2 values: 0.1 to 0.2"]
         write_summaries(tmp_path, outcomes)
-    write_report(tmp_path, outcomes, {})
+    write_summaries(tmp_path, outcomes, past={})
     assert "Latest runs" not in (tmp_path / "index.html").read_text()
-    assert not (tmp_path / overview.FILE_NAME).exists()
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{", '{"a": ' * 3000])

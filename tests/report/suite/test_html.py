@@ -8,16 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from markupsafe import Markup
-
 from dodo_dsl.report import overview
-from dodo_dsl.report.check_display import MEANINGS, BarPlace, Bars, place
+from dodo_dsl.report.checks import MEANINGS
 from dodo_dsl.report.comparison import compare
 from dodo_dsl.report.overview import ReportFiles, ReportPicture, breakable, render
 from dodo_dsl.report.report_folder import write_summaries
 from dodo_dsl.report.results import Circumstances, GivenReport, Repository, RunRecord
-from tests.report.changes.test_check_change import check
-from tests.report.joined.reports import named, write
+from tests.report.joined.reports import check, named, write
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import Chromium, Page
 from tests.report.viewer.hostile import HOSTILE
@@ -64,7 +61,7 @@ def test_a_page_of_a_hundred_tests_is_small() -> None:
 def test_tests_are_searched_filtered_and_sorted(chromium: Chromium, tmp_path: Path) -> None:
     write(tmp_path, TESTS)
     before = [replace(test, outcome="passed") for test in TESTS]
-    write_summaries(tmp_path, TESTS, compare(TESTS, GivenReport(Path("main/results.json"), before)))
+    write_summaries(tmp_path, TESTS, comparison=compare(TESTS, GivenReport(Path("main/results.json"), before)))
     with chromium.page((tmp_path / "index.html").as_uri()) as page:
         names = [test.name for test in (*TESTS[1:2], *TESTS[3:], TESTS[2], TESTS[0])]
         assert shown(page) == names
@@ -112,10 +109,10 @@ def test_no_column_is_clipped(chromium: Chromium, tmp_path: Path) -> None:
     overview.write_history(tmp_path, {new[0].slug: runs})
     comparison = compare([*new, *grid], GivenReport(Path("main/results.json"), [*old, *grid]))
     for changes in (None, comparison):
-        write_summaries(tmp_path, [*new, *grid], changes)
+        write_summaries(tmp_path, [*new, *grid], comparison=changes)
         with chromium.page((tmp_path / "index.html").as_uri()) as page:
             page.value("document.querySelectorAll('details').forEach(each => { each.open = true; })")
-            assert page.value("document.querySelectorAll('.multiples .curve, .thumb svg').length") > 3
+            assert page.value("document.querySelectorAll('.multiples .curve, .thumb img').length") > 3
             for width in (1366, 1024, 768, 390):
                 page.resize(width, 900)
                 page.wait("document.documentElement.scrollWidth <= innerWidth")
@@ -166,7 +163,7 @@ def test_strings_of_others_are_text(chromium: Chromium, tmp_path: Path) -> None:
         for n, text in enumerate(texts)
     ]  # fmt: skip
     old = [replace(test, outcome="passed", checks=({**test.checks[0], "value": -1, "ok": True},)) for test in outcomes]
-    write_summaries(tmp_path, outcomes, compare(outcomes, GivenReport(Path(texts[0]), old)))
+    write_summaries(tmp_path, outcomes, comparison=compare(outcomes, GivenReport(Path(texts[0]), old)))
     with chromium.page((tmp_path / "index.html").as_uri()) as page:
         page.value("document.querySelectorAll('details').forEach(each => { each.open = true; })")
         tags = "img, svg:not(.bar), iframe, base, body style, body link, body meta"
@@ -189,31 +186,6 @@ def test_names_of_matrices_break_between_their_values_alone() -> None:
     assert breakable("t[a=0.45,b=<x>]") == "t<wbr>[a=0.45,<wbr>b=&lt;x&gt;]"
 
 
-@pytest.mark.parametrize(
-    ("checked", "expected"),
-    [
-        (check(2.0, ok=False, max=1), BarPlace(0, 50, 50, 25, False)),
-        (check(0.5, min=1, ok=False), BarPlace(50, 100, 33, 17, False)),
-        (check(3.0, min=1), BarPlace(50, 100, 50, 33, True)),
-        (check(2.0, min=1, max=3), BarPlace(25, 75, 25, 25, True)),
-        (check(9.0, min=1, max=3, ok=False), BarPlace(25, 75, 75, 21, False)),
-        (check(0.0, min=0, ok=False), BarPlace(50, 100, 50, 2, False)),  # a wall that is touched
-        (check(None, min=1, ok=False), None),
-        (check(2.0), None),
-    ],
-)
-def test_a_bar_leads_from_the_limit_to_the_value(checked: dict[str, object], expected: BarPlace | None) -> None:
-    assert place(checked) == expected
-
-
-def test_equal_bars_of_a_page_are_drawn_once() -> None:
-    bars = Bars()
-    assert bars.symbols() == ""
-    drawn = [bars.bar(check(value, max=4)) for value in (1.0, 3.0, 1.0)]
-    assert drawn[0] == drawn[2] != drawn[1]
-    assert bars.symbols().count("<symbol") == 2
-
-
 def test_a_matrix_is_one_row_and_what_did_not_pass_comes_first() -> None:
     found = [(row.outcomes[0].name, len(row.outcomes), row.count("failed")) for row in overview.rows(TESTS)]
     assert found == [("sil-b", 1, 1), ("dil-m[light=dark,speed=1]", 4, 2), ("hil-c", 1, 0), ("sil-a", 1, 0)]
@@ -224,7 +196,6 @@ def test_a_usual_page_of_a_hundred_tests_is_below_half_a_megabyte() -> None:
     limited = [{**check(0.2, max=1.0, unit="m"), "name": name} for name in list(MEANINGS)[:7]]
     counted = [{**check(7.0), "name": name} for name in list(MEANINGS)[7:22]]
     tests = [named(f"sil-{n}", checks=(*limited, *counted), description="Find the cones.") for n in range(100)]
-    way = Markup("<svg>" + "l6 0 " * 120 + "</svg>")
     page = render(
         tests,
         ReportFiles(
@@ -233,7 +204,6 @@ def test_a_usual_page_of_a_hundred_tests_is_below_half_a_megabyte() -> None:
             {test.slug: f"{test.slug}/test.rec" for test in tests},
             {},
             {test.slug: f"{test.slug}/drive.html" for test in tests},
-            ways={test.slug: way for test in tests},
         ),
     )
     assert 250_000 < len(page.encode()) < 500_000

@@ -3,7 +3,6 @@
 import io
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -11,11 +10,10 @@ from dodo_dsl.cli import run_report
 from dodo_dsl.cli.display import Verbosity
 from dodo_dsl.outcome import Outcome, with_margin
 from dodo_dsl.report.comparison import compare
-from dodo_dsl.report.instances import decisive_value, grids, worst_instances
+from dodo_dsl.report.instances import compared, grids
 from dodo_dsl.report.report_folder import write_summaries
 from dodo_dsl.report.results import GivenReport
-from tests.report.changes.test_check_change import check
-from tests.report.joined.reports import named
+from tests.report.joined.reports import check, named
 
 
 def shown(*names: str) -> list[tuple[object, ...]]:
@@ -67,55 +65,46 @@ def test_what_is_no_matrix_has_no_grid(names: list[str]) -> None:
     assert shown(*names) == []
 
 
-@pytest.mark.parametrize(
-    ("checks", "told"),
-    [
-        ([], ""),
-        ([check(1)], ""),
-        ([check(9, max=10), check(0.1, min=0.01), check(5, max=6, unit="s")], "x 9 m"),
-        ([check(9, max=10), check(2, max=1, unit="s"), check(3, max=1)], "x 2 s"),
-        ([check(None, ok=False, max=1)], "x none"),
-        (
-            [
-                {**check(None, ok=False, unit="s", max=40), "name": "time-to-goal"},
-                {**check(0.0, ok=False, min=0), "name": "wall-margin"},
-            ],
-            "wall-margin 0 m",
-        ),
-    ],
-)
-def test_the_value_that_decided(checks: list[dict[str, Any]], told: str) -> None:
-    assert decisive_value(named("a", checks=tuple(checks))) == told
-
-
-def of_matrix() -> list[Outcome]:
-    """Three recordings, of which the second failed, and others."""
-    made = [
-        named(f"a[rec={rec}]", outcome=outcome, checks=tuple(with_margin(check(value, min=0.5)) for value in values))
-        for rec, outcome, values in (
-            ("../r/x.rec", "passed", (0.6, 0.9)), ("../r/y.rec", "failed", (0.4, 0.9)), ("../r/z.rec", "error", ()),
+def matrix(**values: tuple[str, float, float]) -> list[Outcome]:
+    """Instances of a test by their outcome, ``to-goal`` and ``wall-margin``."""
+    return [
+        named(
+            f"a[rec={rec}]",
+            outcome=outcome,
+            checks=(
+                with_margin(check(left, name="to-goal", max=0)),
+                with_margin(check(margin, name="wall-margin", min=0.02)),
+            ),
         )
-    ]  # fmt: skip
-    return [*made, named("b"), named("b[run=2]"), named("c[x=1]")]
+        for rec, (outcome, left, margin) in values.items()
+    ]
 
 
-def test_the_worst_instance_of_a_matrix_is_named_by_its_margin() -> None:
-    worst = "a: 1 of 3 passed, worst is [rec=../r/y.rec]: x 0.4 m (at least 0.5 m)"
-    assert [one.in_words() for one in worst_instances(of_matrix())] == [worst]
-    passed = [outcome for outcome in of_matrix() if outcome.outcome == "passed"]
-    assert worst_instances(passed) == []
-    best = replace(passed[0], name="a[rec=../r/w.rec]", checks=(with_margin(check(0.9, min=0.5)),))
-    assert [one.choice for one in worst_instances([best, passed[0]])] == ["[rec=../r/x.rec]"]
+def test_the_worst_instance_is_named_by_the_check_that_all_cells_show() -> None:
+    """Not by the way left to the goal, which only follows from a wall that is touched."""
+    outcomes = [
+        *matrix(x=("passed", 0, 0.03), y=("failed", 3.4, 0), z=("passed", 0, 0.5)),
+        named("a[rec=w]", outcome="error"),
+    ]
+    (found,) = compared([*outcomes, named("b"), named("b[run=2]"), named("c[x=1]")])
+    assert found.in_words() == "a: 2 of 4 passed, worst is [rec=y]: wall-margin 0 m (at least 0.02 m)"
+    assert [(one := found.of(o)) and one["value"] for o in outcomes] == [0.03, 0, 0.5, None]
+    headlined = [replace(o, headline="to-goal") for o in matrix(x=("passed", 0, 0.03), y=("failed", 3.4, 0.4))]
+    assert compared(headlined)[0].check == "to-goal"
+    assert compared(matrix(x=("passed", 0, 0.03))) == []
 
 
 def test_reports_name_the_worst_instance(tmp_path: Path) -> None:
     """On the page, in the note of a merge request, and at the end of a run, but not of a quiet one."""
-    write_summaries(tmp_path, of_matrix(), compare(of_matrix(), GivenReport(Path("main"), [])))
+    outcomes = matrix(x=("passed", 0, 0.03), y=("failed", 3.4, 0.01))
+    write_summaries(tmp_path, outcomes, comparison=compare(outcomes, GivenReport(Path("main"), [])))
     page = (tmp_path / "index.html").read_text()
-    slug = of_matrix()[1].slug
-    assert f'<p>1 of 3 passed; the worst is <a href="#{slug}">' in page and "x 0.4 m</p>" in page
-    worst = "a: 1 of 3 passed, worst is [rec=../r/y.rec]: x 0.4 m (at least 0.5 m)"
+    assert (
+        '<p>1 of 2 passed. Each cell shows wall-margin, at least 0.02\u00a0m; the worst is <a href="#a--rec-y">' in page
+    )
+    assert page.count('<a class="ok" href="#a--rec-x">') == page.count('<a class="no" href="#a--rec-y">') == 1
+    worst = "a: 1 of 2 passed, worst is [rec=y]: wall-margin 0.01 m (at least 0.02 m)"
     assert f"**Matrices (1)**\n- `{worst}`\n" in (tmp_path / "changes.md").read_text()
     for verbosity, number in ((Verbosity.NORMAL, 1), (Verbosity.QUIET, 0)):
-        run_report.write_summary(stream := io.StringIO(), of_matrix(), {}, [], verbosity)
+        run_report.write_summary(stream := io.StringIO(), outcomes, {}, [], verbosity)
         assert stream.getvalue().splitlines().count(worst) == number

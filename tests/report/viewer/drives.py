@@ -18,10 +18,11 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording_writer import RecordingWriter
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.report.report_folder import Drawable, write_report
+from dodo_dsl.report.report_folder import Drawable
 from services.base import Context, Service
 from services.base.flags import load_manifest, parse
 from services.base.service import Build
+from tests.report.joined.reports import draw
 
 ROOT = Path(__file__).parents[3]
 EPOCH = 1_700_000_000_000_000
@@ -72,7 +73,7 @@ def write(report: Path, drives: Iterable[MadeDrive]) -> list[Outcome]:
         record(report / slug / "test.rec", drive)
         log(report / slug / "logs", drive)
         judge(report / slug / "logs", plan, compiled, drive)
-    assert write_report(report, outcomes, tests) == []
+    assert draw(report, outcomes, tests) == []
     return outcomes
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dodo_dsl.report.trajectory import Way, read_drive
+from dodo_dsl.report.trajectory import Way, ground_of
 from dodo_dsl.report.viewer import encoded, page
+from dodo_dsl.report.viewer import recorded as recorded_test
 from dodo_dsl.report.viewer.record import JudgedRecord, read
 from services.base import Judged, JudgedBoxes
 from services.base import judged as recording
@@ -37,7 +38,7 @@ def test_a_series_with_its_limits_and_its_target(tmp_path: Path) -> None:
     found = recorded(tmp_path, fill)
     (series,) = found.series(EPOCH)
     assert (series["name"], series["unit"], series["high"]) == ("Step", "deg", 3)
-    assert series["note"] == "band ±0.1, at most 3 deg, distance at most 0.5"
+    assert series["note"] == "band ±0.1, at most 3 deg, distance at most 0.5 deg"
     assert encoded.unpacked(series["times"]).tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
     assert encoded.unpacked(series["values"]).tolist()[:4] == np.float32([1, 1.2, 2, 4]).tolist()
     assert series["marks"] == "AAECAgI="  # 0 1 2 2 2
@@ -83,7 +84,7 @@ def test_too_many_boxes_are_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
             record.frame(EPOCH + number, JudgedBoxes([], [("a", 0, 0, 1, 1)] * 2, []))
 
     found = recorded(tmp_path, fill)
-    assert (len(found.frames(EPOCH)), found.why()) == (2, "Only the first 4 boxes are drawn.")
+    assert (len(found.frames(EPOCH)), found.why()) == (2, "Only the first 5 boxes are drawn.")
 
 
 def test_lines_that_are_none_cost_only_themselves(tmp_path: Path) -> None:
@@ -97,7 +98,7 @@ def test_lines_that_are_none_cost_only_themselves(tmp_path: Path) -> None:
 
 
 def test_an_evaluator_without_a_record_is_named(tmp_path: Path) -> None:
-    why = "'track' recorded nothing of what was judged over time: its limits and targets are not drawn."
+    why = "'track' recorded no time series, so no limits and targets are plotted."
     assert read(plan("sil-closed-straight"), tmp_path).why() == why
 
 
@@ -106,8 +107,8 @@ def test_lines_of_the_map_have_roles(tmp_path: Path) -> None:
     whole = plan(failures.wall_hit().slug)
     drives.judge(tmp_path, whole, tmp_path, failures.wall_hit())
     way = read(whole, tmp_path).way
-    assert way is not None and way.goal == "finish"
-    shown = page.scene(whole, tmp_path, way)
+    assert way is not None
+    shown = page.scene(ground_of(whole, tmp_path), way)
     assert {line["name"]: line["role"] for line in shown["lines"]} == {
         "left": "wall",
         "right": "wall",
@@ -117,26 +118,25 @@ def test_lines_of_the_map_have_roles(tmp_path: Path) -> None:
     }
     assert (shown["length"], shown["width"], shown["frame"]["sender"]) == (0.36, 0.16, 0)
     other = replace(way, roles={})
-    assert {line["role"] for line in page.scene(whole, tmp_path, other)["lines"]} == {"other"}
+    assert {line["role"] for line in page.scene(ground_of(whole, tmp_path), other)["lines"]} == {"other"}
 
 
 def test_other_vehicles_are_known_by_their_stamps(tmp_path: Path) -> None:
     """But for the own one; their outlines have x ahead."""
     (tmp_path / "files").symlink_to(ROOT / "tests_registry")
     whole = plan("sil-closed-two-cars")
-    (body,) = page.scene(whole, tmp_path, Way(frame=0))["bodies"]
+    (body,) = page.scene(ground_of(whole, tmp_path), Way(frame=0))["bodies"]
     assert (body["name"], body["sender"], body["colour"]) == ("kiwi", 1, [0.75, 0.1, 0.6])
     xs, ys = zip(*body["outline"], strict=True)
     assert (min(xs), max(xs), min(ys), max(ys)) == pytest.approx((-0.18, 0.18, -0.08, 0.08))
-    assert [each["sender"] for each in page.scene(whole, tmp_path, Way(frame=1))["bodies"]] == [0]
-    assert page.scene(plan("sil-closed-straight"), tmp_path, Way())["bodies"] == []
+    assert [each["sender"] for each in page.scene(ground_of(whole, tmp_path), Way(frame=1))["bodies"]] == [0]
+    assert page.scene(ground_of(plan("sil-closed-straight"), tmp_path), Way())["bodies"] == []
 
 
-def test_the_way_is_that_of_one_sender(tmp_path: Path) -> None:
+def test_the_path_is_that_of_one_sender(tmp_path: Path) -> None:
     """Of the judged vehicle, or else of the first; another vehicle's frames lie between."""
-    (tmp_path / "files").symlink_to(ROOT / "tests_registry")
     frames = [(n / 10, "opendlv.sim.Frame", 3 * (n % 2), {"x": float(n % 2), "qw": 1.0}) for n in range(6)]
     drives.record(tmp_path / "test.rec", drives.MadeDrive("sil-closed-two-cars", 1.0, frames, {}))
+    test = recorded_test.read(tmp_path / "test.rec", drives.MESSAGES)
     for sender, x in ((3, 1.0), (0, 0.0), (7, 0.0)):
-        found = read_drive(plan("sil-closed-two-cars"), tmp_path, tmp_path / "test.rec", Way(frame=sender))
-        assert found is not None and [place[0] for place in found.path] == [x] * 3
+        assert page._path(test, sender)[:, 0].tolist() == [x] * 3

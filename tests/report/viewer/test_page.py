@@ -8,7 +8,7 @@ import pytest
 
 from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.report.viewer import page
-from dodo_dsl.report.viewer.names import SHARED
+from dodo_dsl.report.files import SHARED
 from tests.report.viewer import drives, failures
 from tests.report.viewer.drives import ROOT
 
@@ -20,9 +20,9 @@ from dodo_dsl.report import results
 from dodo_dsl.report.viewer import page
 report, plan = map(Path, sys.argv[1:])
 outcome, = results.load(report / "results.json")
-page.write_shared(report)
+page.write_shared(report, [outcome])
 page.write(report / outcome.slug, outcome, from_json(plan.read_text()), report.parent / "compiled")
-print(sorted({"av", "cv2", "PIL", "shapely"} & set(sys.modules)))
+print(sorted({"av", "PIL", "shapely"} & set(sys.modules)))
 """
 
 
@@ -42,6 +42,6 @@ def test_shared_files_are_written_through_no_symlink(tmp_path: Path) -> None:
     (tmp_path / "others").mkdir()
     (tmp_path / "report").mkdir()
     (tmp_path / "report" / SHARED).symlink_to(tmp_path / "others")
-    page.write_shared(tmp_path / "report")
+    page.write_shared(tmp_path / "report", [])
     assert list((tmp_path / "others").iterdir()) == []
     assert (tmp_path / "report" / SHARED / "main.js").is_file()

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import av
+import cv2
 import numpy as np
 import pytest
 
@@ -17,7 +18,7 @@ from tests.report.viewer.drives import MESSAGES, MadeDrive, Sample, record
 def written(folder: Path, samples: Sequence[Sample]) -> list[Any]:
     record(folder / "test.rec", MadeDrive("x", 1.5, samples, {}))
     test = recorded.read(folder / "test.rec", MESSAGES)
-    return list(pictures.write(folder, [folder / "test.rec", folder / "frames.rec"], test, MESSAGES))
+    return list(pictures.write(folder, [], test, MESSAGES))
 
 
 def test_frames_keep_their_times_and_content(tmp_path: Path) -> None:
@@ -39,8 +40,8 @@ def test_the_oldest_frames_go_where_there_are_too_many(tmp_path: Path, monkeypat
 @pytest.mark.parametrize(
     ("fields", "problem"),
     [
-        ({"format": "VP80", "data": b"\x00\x00\x01\x65"}, "recorded pictures of format 'VP80' are not shown"),
-        ({"format": "h264", "data": b"garbage"}, "none of the recorded pictures stands alone"),
+        ({"format": "VP80", "data": b"\x00\x00\x01\x65"}, "recorded frames of format 'VP80' are not shown"),
+        ({"format": "h264", "data": b"garbage"}, "none of the recorded frames stands alone"),
         ({"format": "h264", "width": 60_000, "height": 60_000, "data": b"\x00\x00\x01\x65"}, "are not shown"),
         ({"format": "h264", "width": 16, "height": 16, "data": b"\x00\x00\x01\x65garbage"}, "are not shown"),
     ],
@@ -49,3 +50,15 @@ def test_what_is_no_video_is_said(tmp_path: Path, fields: dict[str, Any], proble
     (said,) = written(tmp_path, [(0.1, "opendlv.proxy.ImageReading", 0, fields)])
     assert problem in said
     assert [path.name for path in tmp_path.iterdir()] == ["test.rec"]
+
+
+def test_a_recording_that_was_played_shows_its_frames_when_the_test_announced_them(tmp_path: Path) -> None:
+    record(tmp_path / "played.rec", MadeDrive("x", 1.5, list(failures.pictures(1.5)), {}))
+    shared = [(2 + n / 5, pictures.ANNOUNCED, 0, {"width": 160}) for n in range(10)]
+    record(tmp_path / "test.rec", MadeDrive("x", 5.0, shared, {}))
+    test = recorded.read(tmp_path / "test.rec", MESSAGES)
+    played = pictures.Replayed(tmp_path / "played.rec", 0, 0.5, float("inf"))
+    (video,) = pictures.write(tmp_path, [played], test, MESSAGES)
+    assert isinstance(video, Video) and video.times == pytest.approx([2 + n / 5 for n in range(10)])
+    pictures.write_frame(tmp_path, video, 3.05)
+    assert cv2.imread(str(tmp_path / "frame.jpg")).mean() == pytest.approx(100, abs=8)
