@@ -60,7 +60,8 @@ dodo.map = (function () {
       return group;
     };
     const name = (text, kind, x, y) => still(x, y, svg("text", { class: kind, x: 8, y: 4 }, text));
-    const ground = models.map((model) => painted(svg("path", { class: "cone", d: model.points.map(([x, y]) => `M${x} ${y}h0`).join("") }), "stroke", model.colour));
+    const cones = models.map((model) => [model.colour, model.points.map(([x, y]) => `M${x} ${y}h0`).join("")]);
+    const ground = cones.flatMap(([colour, d]) => [svg("path", { class: "cone edge", d }), painted(svg("path", { class: "cone", d }), "stroke", colour)]);
     for (const each of lines) {
       ground.push(svg("path", { class: each.role, d: each.lines.map(([a, b, c, d]) => `M${a} ${b}L${c} ${d}`).join("") }));
       if (["gate", "goal"].includes(each.role) && each.lines.length) ground.push(name(each.name, each.role, each.lines[0][2], each.lines[0][3]));

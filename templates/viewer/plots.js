@@ -60,8 +60,8 @@ dodo.plots = (function () {
       for (const value of values) if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
     }
     if (!Number.isFinite(low + high)) return [0, 1];
-    const pad = (high - low || Math.abs(high) || 1) * 0.08 + near * 0.2;
-    return [Math.min(low, signal.max ?? low) - pad, Math.max(high, signal.min ?? high) + pad];
+    const pad = Math.max(high - low, 0.02 * Math.abs(high), 1e-6) * 0.08 + near * 0.2;
+    return [signal.isPlain && low === signal.min ? low : Math.min(low, signal.max ?? low) - pad, Math.max(high, signal.min ?? high) + pad];
   }
 
   // Limits as shaded areas, and the target with what may lie around it.
@@ -158,7 +158,7 @@ dodo.plots = (function () {
         scales: { x: { time: false, auto: false, range: () => range }, y: { auto: false, range: () => [low, high] } },
         axes: [
           { ...look, size: signal.isAxis ? 24 : 0, values: signal.isAxis ? (_, ticks) => ticks.map((each) => `${number(each)} s`) : () => [], space: 70 },
-          { ...look, size: AXIS, show: true, space: 26, values: (_, ticks) => (signal.isAxis ? [] : ticks.map(number)), grid: { ...look.grid, show: !signal.isAxis } },
+          { ...look, size: AXIS, space: 26, ...(signal.stacked ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500] } : {}), values: (_, ticks) => (signal.isAxis ? [] : ticks.map(number)), grid: { ...look.grid, show: !signal.isAxis } },
         ],
         series: [{}, ...lines],
         hooks: {
@@ -173,7 +173,7 @@ dodo.plots = (function () {
     );
     const now = make("div", { class: "now-line" });
     u.over.append(now);
-    u.over.addEventListener("click", () => cursor.move(u.posToVal(u.cursor.left, "x")));
+    u.over.addEventListener("click", (event) => cursor.move(u.posToVal(event.clientX - u.over.getBoundingClientRect().left, "x")));
     u.over.addEventListener("wheel", (event) => wheel(u, event), { passive: false });
     const one = { u, now };
     charts.add(one);

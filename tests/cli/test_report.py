@@ -53,7 +53,8 @@ def test_what_cannot_be_joined_is_a_sentence(here: Path) -> None:
     for words, said in (
         (["main.json", "job", "-o", "out"], "there is no job/results.json"),
         (["main.json", "no.json", "-o", "out"], "there is no no.json"),
-        (["main.json", "broken", "-o", "out"], "broken/results.json: not results of DoDo (Object missing required field `dodo`)"),
+        (["main.json", "broken", "-o", "out"], "broken/results.json: not results of DoDo "
+             "(Object missing required field `dodo`)"),
         (["main.json", "main.json"], "2 reports are given; name the folder to join them into with -o"),
         (["main.json"], "'main.json' is not called results.json; name a folder for the report with -o"),
         (["main.json", "-o", "full"],

@@ -94,7 +94,7 @@ def test_in_real_time_and_of_single_runs_nothing_is_compared(tmp_path: Path) -> 
 
 def test_results_hold_them(tmp_path: Path) -> None:
     (found,) = among(tmp_path, FIRST, replace(FIRST, reason="\udc80"))
-    circumstances = results.writable(Circumstances(repeated=(found,)))
+    circumstances = Circumstances(repeated=(found,))
     text = results.to_json([FIRST], circumstances)
     jsonschema.validate(json.loads(text), json.loads((package_data.schemas() / "results.schema.json").read_text()))
     (tmp_path / "results.json").write_text(text)

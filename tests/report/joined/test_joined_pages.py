@@ -49,7 +49,7 @@ def test_the_paths_of_two_reports_are_drawn_over_one_another(chromium: Chromium,
         assert page.value("document.querySelectorAll('.map .earlier').length") == 2
         page.value("dodo.cursor.move(2)")
         caption = page.value("document.querySelector('#scene .caption').textContent")
-        assert caption.endswith("dashed: before (failed), 0.8 m apart")
+        assert caption.endswith("dashed: before (failed), 0.802 m apart")
         assert page.faults == []
         both = page.pixels()
     write_other_paths(tmp_path / "report", None, None)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+
 from dodo_dsl.report import overview
 from dodo_dsl.report.checks import MEANINGS
 from dodo_dsl.report.comparison import compare

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.plan.plan_json import to_json
-from dodo_dsl.report.viewer import page
 from dodo_dsl.report.files import SHARED
+from dodo_dsl.report.viewer import page
 from tests.report.viewer import drives, failures
 from tests.report.viewer.drives import ROOT
 
