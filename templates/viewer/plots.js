@@ -137,7 +137,7 @@ dodo.plots = (function () {
     return zoom(at - (at - range[0]) * factor, at + (range[1] - at) * factor);
   }
 
-  // A chart in an element that fills it; `read` is told the time under the pointer, null where there is none.
+  // A chart in an element that fills it; `read` takes the time under the pointer, null where there is none.
   function chart(element, signal, read) {
     const look = { stroke: () => colour("soft"), grid: { stroke: () => colour("grid"), width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif" };
     const bars = uPlot.paths.bars({ size: [0.9, 40, 2] });

@@ -2,6 +2,7 @@
 
 import json
 import math
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -53,23 +54,19 @@ def test_the_forecast_is_the_median_of_the_latest_runs(tmp_path: Path) -> None:
 
 
 def test_a_test_of_another_repository_is_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for number, name in enumerate(("one", "other", "one/below")):
-        (tmp_path / name).mkdir()
-        (tmp_path / name.partition("/")[0] / ".git").mkdir(exist_ok=True)
+    """By its address, wherever it is cloned, or else by the folder of its dodo.yml."""
+    for name, address in (("one", ""), ("other", ""), ("clone", "git@x:a/b.git"), ("again", "git@x:a/b.git")):
+        (tmp_path / name / "below").mkdir(parents=True)
+        (tmp_path / name / "dodo.yml").write_text("dodo: 1\n")
+        if address:
+            subprocess.run(["git", "init", "-q", tmp_path / name], check=True)
+            subprocess.run(["git", "-C", tmp_path / name, "remote", "add", "origin", address], check=True)
+    for name, known in (("one", None), ("other", None), ("one/below", 3.0), ("clone", None), ("again/below", 3.0)):
         monkeypatch.chdir(tmp_path / name)
         found = History(tmp_path / "history.jsonl")
-        assert found.seconds("a/a.dodo.yml", "a", "process", "realtime") == (3.0 if number == 2 else None)
-        assert len(found.times([("a/a.dodo.yml", "a")], "process")) == (number == 2)
+        assert found.seconds("a/a.dodo.yml", "a", "process", "realtime") == known, name
         found.add([took(1.0, 2.0)])
         found.save()
-
-
-def test_times_are_apart_by_clock() -> None:
-    found = History(Path("/nonexistent"))
-    name, outcome = took(1.0, 2.0)
-    found.add([(name, outcome), (name, replace(outcome, clock="lockstep")), (name, replace(outcome, backend="docker"))])
-    assert found.times([("a/a.dodo.yml", "a")], "process") == {"a": [(1.0, 2.0)], "a (lockstep)": [(1.0, 2.0)]}
-    assert found.times([], "process") == {}
 
 
 @pytest.mark.parametrize(
@@ -83,7 +80,7 @@ def test_lines_that_no_run_wrote_are_skipped(tmp_path: Path, change: dict[str, o
     path = tmp_path / "history.jsonl"
     lines = (json.dumps(LINE), json.dumps({**LINE, **change}), "[" * 100_000, '{"when": 1, "spec"', "3", "null")
     path.write_text("".join(f"{line}\n" for line in lines))
-    assert History(path).times([("s", "t")], "process") == {"t": [(1.0, 2.0)]}
+    assert [(run.test, run.setup_s) for run in History(path).runs] == [("t", 1.0)]
 
 
 def test_a_long_history_with_bytes_that_are_not_utf_8_is_shortened(

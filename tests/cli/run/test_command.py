@@ -124,12 +124,10 @@ def test_the_report_of_a_test_that_failed(dodo: Command) -> None:
     assert [service["name"] for service in dodo.result()["services"]] == ["camera", "track", "app"]
 
 
-def test_times_of_all_runs_are_kept_and_drawn(dodo: Command) -> None:
-    """A second run forecasts what the first one took, and the report shows both."""
+def test_times_of_all_runs_are_kept(dodo: Command) -> None:
+    """A second run forecasts what the first one took."""
     assert "; at most " in dodo.run()[1]
     assert "; about " in dodo.run()[1]
-    assert "here, 2 runs" in Path("report/times.svg").read_text().replace(platform.node() or "this machine", "here")
-    assert 'src="times.svg"' in Path("report/index.html").read_text()
     assert len(Path("history.jsonl").read_text().splitlines()) == 2
 
 
@@ -405,3 +403,13 @@ def test_on_rigs_unless_the_application_can_be_started() -> None:
     assert run.choose_backend([plan(application=IMAGE, rig="desk")]) == "mixed"
     started = Application(".", (ApplicationService("app", ("python", "a.py")),))
     assert run.choose_backend([replace(plan(application=started), rig="desk")]) == "process"
+
+
+def test_a_run_of_one_test_keeps_the_others_in_the_report(dodo: Command) -> None:
+    """But for earlier runs of the same test, however often it ran."""
+    for name, words in (("b", ()), ("a", ("--repeat", "2")), ("a", ())):
+        out = dodo.run(*words, tested=plan(name))[1]
+    assert out.endswith("index.html, with 1 test of earlier runs; it replaces an earlier one with 1 other test\n")
+    document = json.loads(Path("report/results.json").read_text())
+    assert [test["slug"] for test in document["tests"]] == ["a", "b"] and len(document["runs"]) == 3
+    assert Path("report/b/drive.html").is_file() and not Path("report/a--run-2").exists()

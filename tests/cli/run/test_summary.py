@@ -27,7 +27,7 @@ def text(outcomes: list[object], tests: dict[str, str], skipped: tuple[NotRun, .
 def test_a_line_each_with_what_explains_it() -> None:
     failed = replace(OUTCOME, notes=("a note",), last_lines=("the last\x1b",))
     assert text([PASSED, failed], {"ok": "ok", "test": "test"}) == (
-        "\n        test     time     wall  smallest margin\n"
+        "\n        test     time     real  closest to failing\n"
         "PASSED  ok    2.2 s    3.2 s  reached it\n"
         "FAILED  test  hit wall\n"
         "        note: a note\n"
@@ -92,7 +92,7 @@ def test_the_table_fits_into_its_terminal(monkeypatch: pytest.MonkeyPatch) -> No
         "PASSED  ok      2.2 s    3.2 s  reached it",
     )
     assert long == [f"PASSED  {LONG}", near.replace("PASSED  near", " " * 12)]
-    assert head == "        test     time     wall  smallest margin"
+    assert head == "        test     time     real  closest to failing"
     assert rows(50, monkeypatch)[1] == "PASSED  near   12.0 s    3.2 s  gap 0.0123 m"
     assert rows(38, monkeypatch)[1] == "PASSED  near   12.0 s    3.2 s  gap 0…"
 
