@@ -46,7 +46,7 @@ class Shot:
     """A page of a report, and how it is shown."""
 
     page: str
-    ready: str = "dodo.film && Array.from(document.querySelectorAll('video'), v => v.readyState).every(s => s > 1)"
+    ready: str = "dodo.plots && Array.from(document.querySelectorAll('video'), v => v.readyState).every(s => s > 1)"
     moment: float | None = None
     """Test time in s, where it is not the one that decided."""
     size: tuple[int, int] = (1366, 768)
