@@ -2,71 +2,67 @@
 
 import argparse
 import math
+from typing import TypeVar
 
 from dodo_dsl.opendlv import numbers
 
 _MOST_SECONDS = 864_000.0
+T = TypeVar("T")
+
+
+def _checked(text: str, value: T, is_good: bool, expected: str) -> T:
+    if not is_good:
+        raise argparse.ArgumentTypeError(f"'{text}' is not {expected}")
+    return value
+
+
+def _number(text: str) -> float:
+    """NaN if it is none."""
+    try:
+        return numbers.number(text)
+    except ValueError:
+        return math.nan
+
+
+def _whole(text: str) -> int:
+    """-1 if it is none."""
+    return numbers.whole(text) if numbers.is_whole(text) else -1
 
 
 def finite(text: str) -> float:
     """A finite number."""
-    try:
-        value = numbers.number(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number")
-    return value
+    return _checked(text, _number(text), math.isfinite(_number(text)), "a number")
 
 
 def patience(text: str) -> float:
     """Seconds, 0 or more."""
-    if (value := finite(text)) < 0:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a time in seconds, expected 0 or more")
-    return value
+    return _checked(text, finite(text), finite(text) >= 0, "a time in seconds, expected 0 or more")
 
 
 def seed(text: str) -> int:
     """A seed of 32 bits."""
-    value = numbers.whole(text) if numbers.is_whole(text) else -1
-    if not 0 <= value < 1 << 32:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 0 to 4294967295")
-    return value
+    return _checked(text, _whole(text), 0 <= _whole(text) < 1 << 32, "a whole number from 0 to 4294967295")
 
 
 def seconds(text: str) -> float:
     """A duration, at most ten days."""
-    try:
-        value = numbers.number(text.removesuffix("s"))
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value <= _MOST_SECONDS:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a time in seconds above 0 and at most {_MOST_SECONDS:g}")
-    return value
+    value, most = _number(text.removesuffix("s")), _MOST_SECONDS
+    return _checked(text, value, 0.0 < value <= most, f"a time in seconds above 0 and at most {most:g}")
 
 
 def minutes(text: str) -> float:
     """A duration in minutes, at most ten days."""
-    value = finite(text)
-    if not 0.0 < value <= _MOST_SECONDS / 60:
-        raise argparse.ArgumentTypeError(
-            f"'{text}' is not a time in minutes above 0 and at most {_MOST_SECONDS / 60:g}"
-        )
-    return value
+    value, most = finite(text), _MOST_SECONDS / 60
+    return _checked(text, value, 0.0 < value <= most, f"a time in minutes above 0 and at most {most:g}")
 
 
 def shard(text: str) -> tuple[int, int]:
     """``I/N``: the part of several that is meant, from 1 on, and how many there are."""
     index, _, total = text.partition("/")
-    found = [numbers.whole(part) if numbers.is_whole(part) else 0 for part in (index, total)]
-    if not 1 <= found[0] <= found[1]:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a part of several, expected 1/4 to 4/4 for four")
-    return found[0], found[1]
+    found = _whole(index), _whole(total)
+    return _checked(text, found, 1 <= found[0] <= found[1], "a part of several, expected 1/4 to 4/4 for four")
 
 
 def positive(text: str) -> int:
     """A whole number of at least 1."""
-    value = numbers.whole(text) if numbers.is_whole(text) else 0
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
-    return value
+    return _checked(text, _whole(text), _whole(text) >= 1, "a whole number of at least 1")

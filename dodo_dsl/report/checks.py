@@ -116,10 +116,16 @@ def decisive(outcome: Outcome) -> Check | None:
 
 
 def title(outcome: Outcome) -> str:
-    """The first of the reasons, and how many more there are; of a test that passed, without its values."""
+    """The first of the reasons, and how many more there are; of a test that passed, without its values.
+
+    A reason that says of a check how far it is from its limit is replaced by that check as it reads elsewhere.
+    """
     if outcome.outcome == "passed":
         return outcome.reason.partition(": ")[0].partition("; ")[0]
     first, *others = outcome.reason.split("; ")
+    failed = [check for check in outcome.checks if not check["ok"] and not only_follows(check, outcome.checks)]
+    if failed and "(at " in first:
+        first, *others = map(in_words, failed)
     return f"{first} (+{len(others)} more)" if others else first
 
 

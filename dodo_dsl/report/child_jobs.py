@@ -5,15 +5,16 @@ Source: https://docs.gitlab.com/api/jobs/ and https://docs.gitlab.com/api/job_ar
 
 import json
 import lzma
-import stat
+import shutil
+import tempfile
 import urllib.error
 import urllib.request
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
-from typing import IO, Any
+from pathlib import Path
+from typing import Any
 
 from dodo_dsl.report.join import MOST_BYTES
 from dodo_dsl.report.results import FILE_NAME, GivenReport, ResultsError, read_given
@@ -28,8 +29,6 @@ _UNREADABLE = (
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, RuntimeError, ValueError, LookupError, OSError
 )  # fmt: skip
 """Raised by zipfile for damage, what is encrypted or compressed in ways that it does not know, and impossible names."""
-_SHOWN_NAME = 60
-_PART = 1 << 20
 _MOST_JSON = 16 << 20
 _MOST_PAGES = 100
 
@@ -110,42 +109,20 @@ def fetch(pipeline: ParentPipeline, folder: Path) -> tuple[list[GivenReport], li
 
 
 def _fetch(pipeline: ParentPipeline, number: int, folder: Path) -> None:
-    """Writes the report among a job's artifacts; raises NoChildJobs."""
+    """Writes the report among a job's artifacts; raises NoChildJobs.
+
+    Extracted files are regular ones below ``folder``, whatever the archive names or calls a link.
+    """
     folder.mkdir()
-    archive = folder / "artifacts.zip"
-    try:
-        with pipeline.opened(f"jobs/{number}/artifacts") as response, archive.open("xb") as file:
-            _copy(response, file, MOST_BYTES)
-        with zipfile.ZipFile(archive) as opened:
-            _extract(opened, folder)
-    except NoChildJobs:
-        raise
-    except _UNREADABLE as error:
-        said = f"its artifacts, job {number}, cannot be read ({str(error) or type(error).__name__})"
-        raise NoChildJobs(f"{said}, expected a zip archive with {FOLDER}/{FILE_NAME}") from None
-    finally:
-        archive.unlink(missing_ok=True)
-
-
-def _extract(archive: zipfile.ZipFile, folder: Path) -> None:
-    """The regular files of the report; names that would not stay inside are refused."""
-    left = MOST_BYTES
-    for entry in archive.infolist():
-        path = PurePosixPath(entry.filename)
-        mode = entry.external_attr >> 16
-        if path.is_absolute() or ".." in path.parts:
-            raise ValueError(f"'{entry.filename[:_SHOWN_NAME]}' lies outside")
-        if path.parts[:1] == (FOLDER,) and not entry.is_dir() and (stat.S_ISREG(mode) or not stat.S_IFMT(mode)):
-            target = folder / path
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with archive.open(entry) as content, target.open("xb") as file:
-                left -= _copy(content, file, left)
-
-
-def _copy(source: IO[bytes], target: IO[bytes], most: int) -> int:
-    """Copies at most so many bytes, and returns how many; raises NoChildJobs beyond them."""
-    while data := source.read(_PART):
-        if target.tell() + len(data) > most:
-            raise NoChildJobs("the artifacts are larger than a report may be")
-        target.write(data)
-    return target.tell()
+    with pipeline.opened(f"jobs/{number}/artifacts") as response, tempfile.TemporaryFile() as archive:
+        try:
+            shutil.copyfileobj(response, archive)
+            with zipfile.ZipFile(archive) as opened:
+                entries = [each for each in opened.infolist() if each.filename.startswith(f"{FOLDER}/")]
+                is_small = sum(each.file_size for each in entries) <= MOST_BYTES
+                opened.extractall(folder, entries if is_small else [])
+        except _UNREADABLE as error:
+            said = f"its artifacts, job {number}, cannot be read ({str(error) or type(error).__name__})"
+            raise NoChildJobs(f"{said}, expected a zip archive with {FOLDER}/{FILE_NAME}") from None
+    if not is_small:
+        raise NoChildJobs("the artifacts are larger than a report may be")

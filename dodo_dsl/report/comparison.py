@@ -128,7 +128,7 @@ class TestChange:
     def in_words(self) -> str:
         """``passed -> failed, hit wall right``"""
         outcomes = dict.fromkeys(o.outcome for o in (self.before, self.after) if o is not None)
-        return f"{' -> '.join(outcomes)}, {self.latest.reason}"
+        return f"{' -> '.join(outcomes)}, {checks.title(self.latest)}"
 
     def other_checks(self) -> str:
         """``new check gates; check speed is gone``, if it is in both."""

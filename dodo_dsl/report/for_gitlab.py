@@ -140,12 +140,7 @@ def _samples(outcome: Outcome) -> Iterator[tuple[str, float | None, dict[str, st
 
 
 def _number(value: float) -> str:
-    """As Go writes it, in whose words the format is defined: with an exponent from a million on."""
-    if not math.isfinite(value):
-        return {math.inf: "+Inf", -math.inf: "-Inf"}.get(value, "NaN")
-    whole, dot, part = repr(value).partition(".")
-    is_large = value > 0 and dot and len(whole) > 6
-    return f"{f'{whole[0]}.{whole[1:]}{part}'.rstrip('0.')}e+{len(whole) - 1:02d}" if is_large else repr(value)
+    return repr(value) if math.isfinite(value) else {math.inf: "+Inf", -math.inf: "-Inf"}.get(value, "NaN")
 
 
 def to_moments(outcomes: Sequence[Outcome], pages: Mapping[str, str], folder: str) -> dict[str, str]:

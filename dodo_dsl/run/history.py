@@ -1,7 +1,6 @@
 """How long tests took on this machine, and what their checks measured, kept over runs: for forecasts and the report."""
 
 import contextlib
-import functools
 import json
 import os
 import re
@@ -9,7 +8,7 @@ import statistics
 import subprocess
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -128,23 +127,10 @@ def _values(checks: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     return {c["name"]: c["value"] for c in checks if names[c["name"]] == 1 and c["value"] is not None}
 
 
-def _read(path: Path) -> tuple[PastRun, ...]:
-    """The valid lines; a file that did not change is not read again."""
-    try:
-        now = path.stat()
-    except OSError:
-        return ()
-    return _read_at(path, now.st_mtime_ns, now.st_size, now.st_ino)
-
-
-@functools.lru_cache(maxsize=1)
-def _read_at(path: Path, *_stamp: int) -> tuple[PastRun, ...]:
-    """Lines that a killed run left unfinished are skipped."""
-    try:
-        lines = regular_file.content(path).splitlines()
-    except OSError:
-        return ()
-    return tuple(run for line in lines if (run := _past_run(line)))
+def _read(path: Path) -> Iterator[PastRun]:
+    """The valid lines: those that a killed run left unfinished are skipped."""
+    with contextlib.suppress(OSError):
+        yield from filter(None, map(_past_run, regular_file.content(path).splitlines()))
 
 
 def _past_run(line: bytes) -> PastRun | None:

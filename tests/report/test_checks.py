@@ -80,6 +80,9 @@ def test_the_check_to_show(checks: list[dict[str, Any]], headline: str, shown: s
 
 def test_a_title_is_the_first_reason() -> None:
     assert title(named("a", outcome="failed", reason="hit wall; late: 3 s; silent")) == "hit wall (+2 more)"
+    failed = (check(0.07095, unit="", max=0.014, name="mean"), check(0.2, unit="", max=0.1, name="std"))
+    outcome = named("a", outcome="failed", reason="the mean is 0.07095 (at most 0.014); so on", checks=failed)
+    assert title(outcome) == "mean 0.0709 (at most 0.014) (+1 more)"
     assert title(named("a", reason="kept to its target: mean 0.1; share 1")) == "kept to its target"
 
 

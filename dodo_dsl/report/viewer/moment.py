@@ -24,18 +24,11 @@ class Moment:
 
 def decisive(outcome: Outcome, duration: float) -> Moment:
     """The evidence of the verdict that became the outcome; without one the end, as what else decides ends a test."""
-    by = ("evaluator", outcome.decided_by) if outcome.decided_by else ("reason", outcome.reason)  # of earlier versions
-    verdict = next((v for v in outcome.verdicts if v.get(by[0]) == by[1]), None)
-    if verdict is None or not isinstance(verdict.get("evidence"), Mapping):
-        return Moment(duration, END)
-    evidence = verdict["evidence"]
-    failed = {check["name"] for check in outcome.checks if not check["ok"]}
-    time = _time(evidence, failed)
+    evidence = next((v["evidence"] for v in outcome.verdicts if v["evaluator"] == outcome.decided_by), {})
+    time = _time(evidence, {check["name"] for check in outcome.checks if not check["ok"]})
     if time is None:
         return Moment(duration, END)
-    return Moment(
-        min(max(time[0], 0.0), max(duration, time[0])), time[1], _number(evidence.get("x")), _number(evidence.get("y"))
-    )
+    return Moment(max(time[0], 0.0), time[1], _number(evidence.get("x")), _number(evidence.get("y")))
 
 
 def _time(evidence: Mapping[str, Any], failed: set[str]) -> tuple[float, str] | None:

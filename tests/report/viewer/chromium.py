@@ -162,6 +162,17 @@ class Page:
         """The same as an array (height, width, 3)."""
         return np.asarray(cv2.imdecode(np.frombuffer(self.picture(), np.uint8), cv2.IMREAD_COLOR), np.uint8)
 
+    def settled(self) -> NDArray[np.uint8]:
+        """The same when nothing moves on it any more."""
+        before = self.pixels()
+        for _ in range(50):
+            self.wait("true")
+            now = self.pixels()
+            if (now == before).all():
+                break
+            before = now
+        return before
+
     @property
     def faults(self) -> list[Any]:
         return [

@@ -29,7 +29,7 @@ def test_evidence_by_what_failed(checks: tuple[str, ...], time: float) -> None:
     assert decisive(replace(OUTCOME, checks=failed(*checks), verdicts=(verdict,)), 5.5).time == time
 
 
-@pytest.mark.parametrize("verdicts", [(), ({"evaluator": "other", "evidence": EVIDENCE},), ({"evaluator": "signal"},)])
+@pytest.mark.parametrize("verdicts", [(), ({"evaluator": "other", "evidence": EVIDENCE},)])
 def test_what_no_verdict_explains_ended_the_test(verdicts: tuple[dict[str, Any], ...]) -> None:
     moment = decisive(replace(OUTCOME, verdicts=verdicts), 5.5)
     assert (moment.time, moment.what) == (5.5, "the end of the test")
