@@ -253,10 +253,8 @@ def bar(check: Check) -> Markup:
     found = bar_place(check)
     if found is None:
         return Markup()
-    edges = "".join(f"M{at} 0h1v10h-1z" for at in (found.first, found.last) if 0 < at < 100)
+    edges = "".join(f"<rect class=edge x={at}% />" for at in (found.first, found.last) if 0 < at < 100)
     return Markup(  # noqa: S704  (numbers)
-        '<svg class="bar" viewBox="0 0 100 10" preserveAspectRatio="none">'
-        f'<path class="room" d="M{found.first} 3H{found.last}v4H{found.first}z"/>'
-        f'<path class="{"ok" if found.ok else "no"}" d="M{found.left} 2h{found.width}v6h-{found.width}z"/>'
-        f'<path class="edge" d="{edges}"/></svg>'
+        f"<svg class=bar><rect class=room x={found.first}% width={found.last - found.first}% />"
+        f"<rect class={'ok' if found.ok else 'no'} x={found.left}% width={found.width}% />{edges}</svg>"
     )

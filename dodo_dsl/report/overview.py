@@ -11,7 +11,7 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -110,23 +110,14 @@ def _svg(values: Sequence[float], limits: Sequence[float]) -> Markup:
     )
 
 
-class ReportPicture(NamedTuple):
-    """A picture of a test: its path relative to the page, and what it shows."""
+class LinkedFiles(NamedTuple):
+    """What a report has of a test: paths relative to its page, empty if there is none, and what each picture shows."""
 
-    path: str
-    text: str
-
-
-@dataclass(frozen=True)
-class ReportFiles:
-    """The files next to the page, as paths relative to it, by slug; ``past`` are earlier values of checks."""
-
-    pictures: Mapping[str, Sequence[ReportPicture]]
-    logs: Mapping[str, Sequence[str]]
-    recordings: Mapping[str, str]
-    specs: Mapping[str, str]
-    drives: Mapping[str, str]
-    past: Past = field(default_factory=dict)
+    pictures: Sequence[tuple[str, str]] = ()
+    logs: Sequence[str] = ()
+    recording: str = ""
+    spec: str = ""
+    drive: str = ""
 
 
 @dataclass(frozen=True)
@@ -176,12 +167,12 @@ _MOST_OF_A_LINE = 56
 
 def render(
     outcomes: Sequence[Outcome],
-    files: ReportFiles,
+    files: Mapping[str, LinkedFiles],
+    past: Past,
     comparison: Comparison | None = None,
     circumstances: Circumstances = NO_CIRCUMSTANCES,
-    branch: str = "",
 ) -> str:
-    """The page; with a comparison, what changed since the report that it names. ``branch`` is the run's, if known."""
+    """The page, with files by slug and earlier values of checks; with a comparison, what changed since that report."""
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
     repositories = {r.commit: r for run in circumstances.runs for r in run.repositories}
     script = (package_data.templates() / "report" / "suite.js").read_text(encoding="utf-8")
@@ -192,8 +183,8 @@ def render(
             outcomes=outcomes,
             rows=rows(outcomes),
             files=files,
+            past=past,
             checks=checks,
-            branch=branch,
             longest=_MOST_OF_A_LINE,
             repositories=list(repositories.values())[:_MOST_REPOSITORIES],
             taken_s=sum((o.setup_s or 0.0) + (o.execution_s or 0.0) for o in outcomes),

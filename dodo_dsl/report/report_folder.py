@@ -1,8 +1,6 @@
 """A report's folder: what is drawn of each test, and the files about all of them."""
 
-import contextlib
 import os
-import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +13,7 @@ from dodo_dsl.report import comparison as report_comparison
 from dodo_dsl.report import for_gitlab, instances, overview, results
 from dodo_dsl.report.comparison import Comparison
 from dodo_dsl.report.files import FRAME, LOGS, PAGE, TRAJECTORY
+from dodo_dsl.report.overview import LinkedFiles
 from dodo_dsl.spec.registry import SUFFIX
 
 _LONGEST_PATH = 1000
@@ -57,79 +56,39 @@ def write_summaries(
     report_comparison.write_markdown(folder, comparison, [one.in_words() for one in instances.compared(outcomes)])
     if past is not None:
         overview.write_history(folder, past)
-    pages, pictures = _named(folder, outcomes, PAGE), {o.slug: _pictures(folder, o) for o in outcomes}
+    files = {o.slug: _files(folder, o) for o in outcomes}
+    pages = {slug: found.drive for slug, found in files.items() if found.drive}
     if pages:
         from dodo_dsl.report.viewer import page
 
         page.write_shared(folder, [o for o in sorted(outcomes, key=overview.urgency) if o.slug in pages])
     shown = _shown(folder)
     with atomic.replacing(folder / "junit.xml") as part:
-        attachments = {slug: f"{shown}/{found[0].path}" for slug, found in pictures.items() if found}
+        attachments = {slug: f"{shown}/{found.pictures[0][0]}" for slug, found in files.items() if found.pictures}
         moments = for_gitlab.to_moments(outcomes, pages, shown)
         for_gitlab.write_junit(part, outcomes, attachments, moments, circumstances.not_run, circumstances.runs)
-    files = overview.ReportFiles(
-        pictures,
-        _logs(folder, outcomes),
-        _named(folder, outcomes, RECORDING),
-        _specs(folder, outcomes),
-        pages,
-        overview.read_history(folder),
-    )
-    html = overview.render(outcomes, files, comparison, circumstances, _branch(circumstances))
+    html = overview.render(outcomes, files, overview.read_history(folder), comparison, circumstances)
     atomic.write_text(folder / "index.html", html)
 
 
-def _branch(circumstances: results.Circumstances) -> str:
-    """The branch of the commit that a run was of, as the job of GitLab or the working folder is on it; else empty."""
-    commits = {repository.commit for run in circumstances.runs for repository in run.repositories}
-    if os.environ.get("CI_COMMIT_SHA") in commits:
-        return os.environ.get("CI_COMMIT_REF_NAME", "")
-    command = ["git", "--no-optional-locks", "-c", "core.fsmonitor=false", "rev-parse", "HEAD", "--abbrev-ref", "HEAD"]
-    with contextlib.suppress(OSError, subprocess.SubprocessError):
-        done = subprocess.run(command, capture_output=True, timeout=5, check=True) if commits else None
-        commit, _, branch = done.stdout.decode(errors="replace").strip().partition("\n") if done else ("", "", "")
-        return branch if commit in commits and branch != "HEAD" else ""
-    return ""
-
-
-def _pictures(folder: Path, outcome: Outcome) -> list[overview.ReportPicture]:
-    """The pictures of a test, the most informative first: it stands beside the test, also in GitLab."""
-    known = (
-        (TRAJECTORY, f"The drive of {outcome.name} from above"),
-        (FRAME, f"What the camera of {outcome.name} saw"),
-        (SNAPSHOT, f"What the camera of {outcome.name} saw"),
-    )
-    place = outcome.slug
+def _files(folder: Path, outcome: Outcome) -> LinkedFiles:
+    """What there is of a test, the most informative picture first: it stands beside the test, also in GitLab."""
+    place, camera = folder / outcome.slug, f"What the camera of {outcome.name} saw"
+    known = [(TRAJECTORY, f"The drive of {outcome.name} from above"), (FRAME, camera), (SNAPSHOT, camera)]
     known = known[1:] + known[:1] if outcome.kind == "perception" else known
-    return [
-        overview.ReportPicture(f"{place}/{name}", text) for name, text in known if (folder / place / name).is_file()
-    ]
+    spec = Path.cwd() / outcome.spec[:_LONGEST_PATH]
+    is_spec = spec.name.endswith(SUFFIX) and spec.is_file()
+    recording, page = (f"{outcome.slug}/{name}" if (place / name).is_file() else "" for name in (RECORDING, PAGE))
+    return LinkedFiles(
+        [(f"{outcome.slug}/{name}", text) for name, text in known if (place / name).is_file()],
+        [path.relative_to(folder).as_posix() for path in sorted((place / LOGS).glob("*.log"))],
+        recording,
+        Path(os.path.relpath(spec, folder.resolve())).as_posix() if is_spec else "",
+        page,
+    )
 
 
 def _shown(folder: Path) -> str:
     """The folder relative to the working folder, which GitLab's attachments are relative to."""
     path = folder.resolve()
     return path.relative_to(Path.cwd()).as_posix() if path.is_relative_to(Path.cwd()) else path.name
-
-
-def _logs(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
-    return {
-        o.slug: [p.relative_to(folder).as_posix() for p in sorted((folder / o.slug / LOGS).glob("*.log"))]
-        for o in outcomes
-    }
-
-
-def _named(folder: Path, outcomes: Sequence[Outcome], file: str) -> dict[str, str]:
-    """The file of this name of each test that has it."""
-    names = {o.slug: f"{o.slug}/{file}" for o in outcomes}
-    return {slug: name for slug, name in names.items() if (folder / name).is_file()}
-
-
-def _specs(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, str]:
-    """The specs that lie below the working folder, as seen from the report."""
-    paths = {o.slug: Path.cwd() / o.spec for o in outcomes if len(o.spec) < _LONGEST_PATH}
-    return {
-        slug: Path(os.path.relpath(path, folder.resolve())).as_posix()
-        for slug, path in paths.items()
-        if path.name.endswith(SUFFIX) and path.is_file()
-    }

@@ -2,7 +2,7 @@
 "use strict";
 
 dodo.checks = (function () {
-  const { make } = dodo.dom;
+  const { make, svg } = dodo.dom;
 
   // The line with the parameters that set the limit marked in it.
   function source(line, flags) {
@@ -23,14 +23,9 @@ dodo.checks = (function () {
 
   // From the nearest limit to the value, on the scale of the report's first page: 100 wide, values grow to the right.
   function bar([first, last, left, width, isOk]) {
-    const part = (kind, from, wide) => {
-      const element = make("i", { class: kind });
-      element.style.left = `${from}%`;
-      element.style.width = `${wide}%`;
-      return element;
-    };
-    const edges = [first, last].filter((at) => at > 0 && at < 100).map((at) => part("edge", at, 1));
-    return make("span", { class: "bar", "aria-hidden": "true" }, part("room", first, last - first), part(isOk ? "ok" : "no", left, width), ...edges);
+    const part = (kind, from, wide) => svg("rect", { class: kind, x: `${from}%`, width: wide && `${wide}%` });
+    const edges = [first, last].filter((at) => at > 0 && at < 100).map((at) => part("edge", at, null));
+    return svg("svg", { class: "bar", "aria-hidden": "true" }, part("room", first, last - first), part(isOk ? "ok" : "no", left, width), ...edges);
   }
 
   function row(check) {

@@ -3,18 +3,18 @@
 import base64
 import hashlib
 import re
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import overview
 from dodo_dsl.report.checks import MEANINGS
 from dodo_dsl.report.comparison import compare
-from dodo_dsl.report.overview import ReportFiles, ReportPicture, breakable, render
+from dodo_dsl.report.overview import LinkedFiles, breakable, render
 from dodo_dsl.report.report_folder import write_summaries
-from dodo_dsl.report.results import Circumstances, GivenReport, Repository, RunRecord
+from dodo_dsl.report.results import GivenReport
 from tests.report.joined.reports import check, named, write
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import Chromium, Page
@@ -42,6 +42,13 @@ def test_the_policy_allows_the_pages_own_script_and_style_alone(tmp_path: Path) 
     assert not re.search(r"<[^>]* (style|on\w+)=", page.replace("<script>", ""))
 
 
+def files(tests: list[Outcome]) -> dict[str, LinkedFiles]:
+    logs = {test.slug: [f"{test.slug}/logs/environment.{layer}.log" for layer in "abcdefgh"] for test in tests}
+    return {
+        s: LinkedFiles([(f"{s}/trajectory.png", "")], logs[s], f"{s}/test.rec", "", f"{s}/drive.html") for s in logs
+    }
+
+
 def test_a_page_of_a_hundred_tests_is_small() -> None:
     """Also when all of 15 checks failed and changed."""
     checks = [tuple({**check(n + old, max=2 * n), "name": f"deviation-{n}"} for n in range(15)) for old in (0.123, 0.5)]
@@ -49,11 +56,7 @@ def test_a_page_of_a_hundred_tests_is_small() -> None:
         [named(f"sil-{n}[light=0.3,speed={n}]", checks=each, last_lines=("frame 12: x",) * 20) for n in range(100)]
         for each in checks
     )
-    logs = {test.slug: [f"{test.slug}/logs/{layer}.log" for layer in "abcdefgh"] for test in new}
-    nothing: dict[str, list[ReportPicture]] = {test.slug: [] for test in new}
-    page = render(
-        new, ReportFiles(nothing, logs, {}, {}, {}), compare(new, GivenReport(Path("main/results.json"), old))
-    )
+    page = render(new, files(new), {}, compare(new, GivenReport(Path("main/results.json"), old)))
     assert 300_000 < len(page.encode()) < 1_000_000
 
 
@@ -197,29 +200,5 @@ def test_a_usual_page_of_a_hundred_tests_is_below_half_a_megabyte() -> None:
     limited = [{**check(0.2, max=1.0, unit="m"), "name": name} for name in list(MEANINGS)[:7]]
     counted = [{**check(7.0), "name": name} for name in list(MEANINGS)[7:22]]
     tests = [named(f"sil-{n}", checks=(*limited, *counted), description="Find the cones.") for n in range(100)]
-    page = render(
-        tests,
-        ReportFiles(
-            {test.slug: [] for test in tests},
-            {test.slug: [f"{test.slug}/logs/environment.{layer}.log" for layer in "abcdefgh"] for test in tests},
-            {test.slug: f"{test.slug}/test.rec" for test in tests},
-            {},
-            {test.slug: f"{test.slug}/drive.html" for test in tests},
-        ),
-    )
+    page = render(tests, files(tests), {})
     assert 250_000 < len(page.encode()) < 500_000
-
-
-def test_the_branch_is_shown_where_its_commit_is_the_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    git = ("git", "-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false")
-    for words in (("init", "-q", "-b", "<main>"), ("commit", "-q", "--allow-empty", "-m", "x")):
-        subprocess.run([*git, *words], check=True)
-    commit = subprocess.run(["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
-    for name, value in (("CI_COMMIT_SHA", "b" * 40), ("CI_COMMIT_REF_NAME", "of-the-job")):
-        monkeypatch.setenv(name, value)
-    for of_run, shown_branch in ((commit, "&lt;main&gt;"), ("b" * 40, "of-the-job"), ("c" * 40, None)):
-        run = RunRecord("2026-11-23T04:10:00+00:00", "host", "1", "dodo run", (Repository("tests", of_run, False),))
-        write_summaries(tmp_path / "report", TESTS, circumstances=Circumstances((run,)))
-        found = re.findall("<dt>Branch</dt><dd>(.*?)</dd>", (tmp_path / "report" / "index.html").read_text())
-        assert found == ([shown_branch] if shown_branch else [])

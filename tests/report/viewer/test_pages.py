@@ -218,7 +218,7 @@ def test_strings_of_others_are_text(chromium: Chromium, hostile_report: Path) ->
             page.value("dodo.cursor.move(0.7)")
             page.wait("true")
             assert page.value("document.getElementById('reason').title") == reason
-            tags = "img, svg:not(.map, .screen *), iframe, style, base"
+            tags = "img, svg:not(.map, .bar, .screen *), iframe, style, base"
             assert page.value(f"Array.from(document.querySelectorAll('{tags}'), e => e.outerHTML)") == []
             assert page.value("document.querySelectorAll('script').length") == SCRIPTS
             assert page.value("[window.hacked, {}.polluted, Object.keys(Object.prototype).length]") == [None, None, 0]
