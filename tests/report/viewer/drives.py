@@ -79,7 +79,8 @@ def write(report: Path, drives: Iterable[MadeDrive]) -> list[Outcome]:
 
 def outcome_of(drive: MadeDrive, slug: str) -> Outcome:
     plain = Outcome(drive.slug, slug, "t.dodo.yml", "sil", "closed-loop", "failed", "", 130, 0, "lockstep", "process")
-    return replace(plain, **drive.outcome)
+    decided = [verdict["evaluator"] for verdict in drive.outcome.get("verdicts", ())]
+    return replace(plain, **{"decided_by": "".join(decided[:1]), **drive.outcome})
 
 
 def record(path: Path, drive: MadeDrive, epoch: int = EPOCH, speed: float = SPEED) -> None:
