@@ -1,7 +1,7 @@
 """From a command line of ``dodo run`` to jobs: compiled tests, also at samples, and the folders of their reports.
 
-``--samples`` takes tests at samples of their ranges. Shipped tests without a rig, or on an emulated one that is not
-built, are left out: nobody asked for them. The fork server loads while tests are compiled: on another core, it costs no
+``--samples`` takes tests at samples of their ranges. Shipped tests without a rig are left out: nobody asked for them.
+The fork server loads while tests are compiled: on another core, it costs no
 time then.
 """
 
@@ -34,48 +34,21 @@ from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deploymen
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.model import CLOCKS
 from dodo_dsl.spec.registry import SUFFIX
-from dodo_dsl.spec.rig import EMULATED, PORT, SIMULATION_TAG
+from dodo_dsl.spec.rig import SIMULATION_TAG
 from dodo_dsl.spec.vary import Values
 from dodo_dsl.terminal import printable
 
 
 def without_rigless(checked: Checked, options: argparse.Namespace) -> tuple[Checked, str]:
-    """The same without shipped tests whose rig is not built, or is missing and no word asks for it; lines on them."""
-    from dodo_dsl.run.capabilities import emulator_folder
-
-    unasked = [test for test in checked.tests if test.spec.path in checked.unasked]
-    all_ask = options.test or checked.settings.emulate
-    rigless = {test.spec.path for test in unasked if not all_ask and test.rig and test.rig.is_missing}
-    unbuilt = {test.spec.path for test in unasked if _is_emulated(test)} - rigless
-    if unbuilt and (emulator_folder() or not _runs_processes(checked, options.backend)):
-        unbuilt = set()
-    said = ""
-    for paths, where in (
-        (rigless, "that need a rig, which dodo.yml does not have: {} (--emulate takes an emulated one)"),
-        (unbuilt, "on the emulated rig, which is not built: {} (see dodo doctor)"),
-    ):
-        names = printable(", ".join(sorted({spec.location.stem for spec in checked.specs if spec.path in paths})))
-        said += f"skipped shipped tests {where.format(names)}\n" if paths else ""
-    if not said:
+    """The same without shipped tests whose rig is missing, unless words ask for tests; a line on them."""
+    missing = {test.spec.path for test in checked.tests if test.rig and test.rig.is_missing} & checked.unasked
+    if not missing or options.test or checked.settings.emulate:
         return checked, ""
-    known, kept = set(checked.diagnostics), [s for s in checked.specs if s.path not in rigless | unbuilt]
-    fewer = narrowed(checked, kept)
+    names = printable(", ".join(sorted({spec.location.stem for spec in checked.specs if spec.path in missing})))
+    known, fewer = set(checked.diagnostics), narrowed(checked, [s for s in checked.specs if s.path not in missing])
     found = tuple(d for d in fewer.diagnostics if d.severity == "error" or d in known)
-    return replace(fewer, diagnostics=found), said
-
-
-def _runs_processes(checked: Checked, backend: str | None) -> bool:
-    if checked.application is None:
-        return False
-    services = checked.application.services.values()
-    by_default = all("x-dodo-process" in service.node.entries for service in services)
-    return by_default if backend is None else backend != "docker"
-
-
-def _is_emulated(test: ResolvedTest) -> bool:
-    """Whether the rig's firmware runs in the simulator; for a camera alone, nothing has to be built."""
-    given = (argument for service in test.services for argument in service.arguments.values())
-    return any(argument.parameter.rig == PORT and argument.text == EMULATED for argument in given)
+    where = f"that need a rig, which dodo.yml does not have: {names} (--emulate takes an emulated one)"
+    return replace(fewer, diagnostics=found), f"skipped shipped tests {where}\n"
 
 
 def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Job], Deployment]:

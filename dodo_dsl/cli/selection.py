@@ -4,7 +4,6 @@ import argparse
 import fnmatch
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import package_data
@@ -19,6 +18,7 @@ from dodo_dsl.terminal import printable
 
 _INSTANCES = re.compile(r"(?P<test>[^\[\]]+)\[(?P<pairs>[^=\[\]]+=.*)\]")
 _COMMA = re.compile(r",(?=[^,=]+=)")
+_MOST_SHOWN = 6
 
 
 class NoSuchTest(UsageError):
@@ -111,28 +111,26 @@ def _is_name(word: str, spec: Spec) -> bool:
 
 def _is_meant(word: str, spec: Spec) -> bool:
     """Whether a word is the name of a test, with parameters or without."""
-    asked = _parse(word)
-    return _is_name(word, spec) or (asked is not None and _is_name(asked.test, spec))
+    return _is_name(word, spec) or _is_name(_parsed(word)[0], spec)
 
 
 def _named(word: str, specs: Sequence[Spec], deployment: Deployment) -> list[Spec]:
-    if found := [s for s in specs if _is_name(word, s)]:
+    """The tests, or instances of them, that a word names; raises NoSuchTest."""
+    test, values = _parsed(word)
+    tests = [s for s in specs if any(fnmatch.fnmatchcase(name, test) for name in (s.location.stem, s.slug))]
+    title = word.replace("[", "[[]")  # brackets mean themselves
+    found = [s for s in specs if _is_name(word, s)]
+    found = found or [s for s in tests if _fits(s, values)]
+    found = found or [s for s in specs if fnmatch.fnmatchcase(s.title, title)]
+    if found:
         return found
-    asked = _parse(word)
-    if asked and (tests := [s for s in specs if _matches(s, asked.test)]):
-        try:
-            return _instances_of(asked, tests)
-        except NoSuchTest:
-            if found := [s for s in specs if _matches_title(s, word)]:
-                return found
-            raise
-    found = [s for s in specs if _matches(s, word) or _matches_title(s, word)]
-    if not found:
-        hint = _shipped_hint(word, deployment) or did_you_mean(
-            word, list(dict.fromkeys(s.location.stem for s in specs))
-        )
-        raise NoSuchTest(f"unknown test '{word}'" + (f"; {hint}" if hint else ""))
-    return found
+    if tests:
+        shown = [s.title for s in tests[:_MOST_SHOWN]]
+        more = f" and {len(tests) - len(shown)} more" if len(tests) > len(shown) else ""
+        raise NoSuchTest(f"no instance of '{test}' has these values; known: {', '.join(shown)}{more}")
+    names = list(dict.fromkeys(s.location.stem for s in specs))
+    hint = _shipped_hint(word, deployment) or did_you_mean(word, names)
+    raise NoSuchTest(f"unknown test '{word}'" + (f"; {hint}" if hint else ""))
 
 
 def _shipped_hint(word: str, deployment: Deployment) -> str:
@@ -141,83 +139,22 @@ def _shipped_hint(word: str, deployment: Deployment) -> str:
         return ""
     shipped = [location.stem for location in locate([], [package_data.registry()])[0]]
     names = [name for name in shipped if fnmatch.fnmatchcase(name, word) or re.split(r"\[|--", word)[0] == name]
-    if not names:
-        return ""
-    if names == [word]:
-        said = "it ships"
-    else:
-        said = f"'{names[0]}' ships" if len(names) == 1 else f"'{names[0]}' and {len(names) - 1} more ship"
-    return f"{said} with DoDo: add \"{SHIPPED}\" to 'registry' in {FILE_NAME}"
+    return f"'{names[0]}' ships with DoDo: add \"{SHIPPED}\" to 'registry' in {FILE_NAME}" if names else ""
 
 
-def _matches(spec: Spec, pattern: str) -> bool:
-    """Whether a pattern fits the name of a test."""
-    return any(fnmatch.fnmatchcase(name, pattern) for name in (spec.location.stem, spec.slug))
-
-
-def _matches_title(spec: Spec, pattern: str) -> bool:
-    """Whether a pattern fits that of an instance, such as ``name[light=dark]``, whose brackets mean themselves."""
-    return fnmatch.fnmatchcase(spec.title, pattern.replace("[", "[[]"))
-
-
-@dataclass(frozen=True)
-class _InstancePattern:
+def _parsed(word: str) -> tuple[str, Mapping[str, Sequence[str]]]:
     """The name or pattern of tests, and values of parameters, one of which an instance has to have."""
-
-    test: str
-    values: Mapping[str, Sequence[str]]
-
-
-def _parse(word: str) -> _InstancePattern | None:
-    """None if a word is anything else."""
     match = _INSTANCES.fullmatch(word)
-    if match is None:
-        return None
     values: dict[str, list[str]] = {}
-    for pair in _COMMA.split(match["pairs"]):
+    for pair in _COMMA.split(match["pairs"]) if match else ():
         name, _, value = pair.partition("=")
         values.setdefault(name.strip(), []).append(value.strip())
-    return _InstancePattern(match["test"], values)
+    return match["test"] if match else word, values
 
 
-def _instances_of(asked: _InstancePattern, specs: Sequence[Spec]) -> list[Spec]:
-    """Those of ``specs``, the instances of one or more tests, with the values; raises NoSuchTest."""
-    for name, values in asked.values.items():
-        has_name = [spec for spec in specs if name in dict(spec.choice.values)]
-        if not has_name:
-            raise NoSuchTest(_without(asked.test, name, specs))
-        for value in values:
-            if not any(_fits(spec, name, value) for spec in has_name):
-                known = dict.fromkeys(dict(spec.choice.values)[name].text for spec in has_name)
-                raise NoSuchTest(f"no instance of '{asked.test}' has {name}={value}" + _hint(value, list(known)))
-    found = [
-        spec
-        for spec in specs
-        if all(any(_fits(spec, name, value) for value in values) for name, values in asked.values.items())
-    ]
-    if not found:
-        said = ", ".join(f"{name}={' or '.join(values)}" for name, values in asked.values.items())
-        raise NoSuchTest(f"no test '{asked.test}' has all of {said}")
-    return found
-
-
-def _fits(spec: Spec, name: str, value: str) -> bool:
-    text = next((chosen.text for known, chosen in spec.choice.values if known == name), None)
-    return text is not None and (text == value or fnmatch.fnmatchcase(text, value))
-
-
-def _without(test: str, name: str, specs: Sequence[Spec]) -> str:
-    if any(one.name == name for spec in specs for one in spec.ranges):
-        return (
-            f"'{name}' of '{test}' is a range of 'vary' and no parameter of its matrix: a run takes the nominal value, "
-            "and dodo search looks at others"
-        )
-    known = list(dict.fromkeys(known for spec in specs for known, _ in spec.choice.values))
-    if not known:
-        return f"'{test}' has no parameters, because it has no matrix"
-    return f"'{test}' has no parameter '{name}'" + _hint(name, known)
-
-
-def _hint(word: str, known: Sequence[str]) -> str:
-    hint = did_you_mean(word, known)
-    return f"; {hint}" if hint else ""
+def _fits(spec: Spec, values: Mapping[str, Sequence[str]]) -> bool:
+    chosen = {name: value.text for name, value in spec.choice.values}
+    return all(
+        name in chosen and any(chosen[name] == value or fnmatch.fnmatchcase(chosen[name], value) for value in wanted)
+        for name, wanted in values.items()
+    )

@@ -213,15 +213,13 @@ registry: [tests, "dodo:"]
 """
 ON_THE_RIG = ["hil-closed-oval", "hil-dynamic", "hil-open-straight"]
 RIGLESS = "skipped shipped tests that need a rig, which dodo.yml does not have: "
-SAID = f"skipped shipped tests on the emulated rig, which is not built: {', '.join(ON_THE_RIG)} (see dodo doctor)\n"
 
 
 @pytest.fixture
-def shipped(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A deployment of the shipped tests, without an emulated rig that is built."""
+def shipped(folder: Path) -> Path:
+    """A deployment of the shipped tests."""
     examples.write(DRIVER, folder)
     (folder / "driver.py").touch()
-    monkeypatch.setenv("DODO_FIRMWARE", str(folder / "firmware"))
     return folder
 
 
@@ -235,21 +233,19 @@ def selected(folder: Path, *words: str) -> tuple[list[str], str]:
 
 @pytest.mark.thorough
 def test_those_that_nobody_named_are_left_out(shipped: Path) -> None:
-    names, said = selected(shipped, "--level", "sil", "--level", "hil", "--emulate")
-    assert SAID in said and "sil-closed-straight" in names and not set(ON_THE_RIG) & set(names)
     names, said = selected(shipped, "--level", "sil", "--level", "hil")
     assert f"{RIGLESS}{', '.join(ON_THE_RIG)} (--emulate" in said and "sil-closed-straight" in names
-    assert SAID not in said and not set(ON_THE_RIG) & set(names)
-    with pytest.raises(UsageError, match="no tests to run"):
-        selected(shipped, "hil-*")
+    assert not set(ON_THE_RIG) & set(names)
+    assert set(ON_THE_RIG) <= set(selected(shipped, "--level", "hil", "--emulate")[0])
+    assert selected(shipped, "hil-dynamic") == (["hil-dynamic"], "")
 
 
 @pytest.mark.thorough
-def test_they_run_where_they_are_named_or_can_run(shipped: Path) -> None:
-    assert selected(shipped, "hil-dynamic") == (["hil-dynamic"], "")
-    assert selected(shipped, "hil-*", "--backend", "docker")[0] == ON_THE_RIG, "the rig is in an image"
-    (shipped / "firmware").mkdir()
-    for name in ("rig-emulator", "gantry.elf"):
-        (shipped / "firmware" / name).touch()
-    names, said = selected(shipped, "hil-*")
-    assert names == ON_THE_RIG and "emulated rig" not in said
+def test_each_test_is_in_one_part(shipped: Path) -> None:
+    """With all of its repetitions."""
+    parts = [selected(shipped, "sil-closed-*", "--repeat", "2", "--shard", f"{part}/3")[0] for part in (1, 2, 3)]
+    every = selected(shipped, "sil-closed-*")[0]
+    assert len(every) > 3 and sorted(name for part in parts for name in part) == sorted(2 * every)
+    assert not set(parts[0]) & set(parts[1]) and all(map(set, parts))
+    few = selected(shipped, "sil-closed-straight", "--shard", "2/2")
+    assert few[0] == []
