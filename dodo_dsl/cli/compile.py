@@ -284,7 +284,7 @@ def _names(names: Sequence[str]) -> str:
 
 
 def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    from dodo_dsl.emit.output_folder import add_images, stale_folders, write
+    from dodo_dsl.emit.output_folder import stale_folders, write
 
     jobs = _job_options(options)
     if not checked.ok:
@@ -296,9 +296,7 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
     if has_errors(diagnostics):
         return Exit.USAGE
     gone = [folder.name for folder in stale_folders(made.compiled, options.output)]
-    write(made.compiled, made.pipeline, options.output)
-    if options.images:
-        add_images(made.compiled, jobs.images, options.output)
+    write(made.compiled, made.pipeline, options.output, jobs.images)
     if options.format == "text" and options.verbosity is not Verbosity.QUIET:
         plans = made.compiled.suite.plans
         _list(options, stdout, "compiled", [(plan.name, str(options.output / plan.slug)) for plan in plans])

@@ -153,3 +153,10 @@ def test_nothing_is_written_through_links_that_look_like_shared_files(pair: Path
     (pair / SHARED).symlink_to(tmp_path / "theirs")
     code, _, err = run("compile")
     assert code == 2 and "a symlink, which no output follows" in err
+
+
+def test_a_folder_of_others_is_not_replaced(pair: Path, tmp_path: Path) -> None:
+    before = tree(tmp_path)
+    code, _, err = run("compile", "-o", "registry")
+    assert code == 2 and "no compiled test; name another folder with --output" in err
+    assert (tree(tmp_path), pair.exists()) == (before, False)
