@@ -9,13 +9,13 @@ import json
 import os
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
 from dodo_dsl import atomic, package_data
-from dodo_dsl.cli import display, selection
-from dodo_dsl.cli.display import Verbosity, write_diagnostics
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.display import write_diagnostics
 from dodo_dsl.cli.errors import Exit, UsageError, files_of_the_user
 from dodo_dsl.compiler import Checked, plan
 from dodo_dsl.diagnostics import (
@@ -91,10 +91,8 @@ EXAMPLES = """examples:
 """
 
 
-_SHORT_DIFF = 30  # lines that are shown without --diff
-_MOST_NAMES = 8
+_MOST_LINES = 100
 _MOST_PASSES = 5
-_MOST_PROBLEMS = 1000
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -107,8 +105,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("generated"),
                         help="output folder (default: generated)")  # fmt: skip
     parser.add_argument("--check", action="store_true", help="write nothing; show problems and what is stale in DIR")
-    parser.add_argument("--diff", action="store_true", help="with --check: show every difference")
-    display.add_verbosity(parser, "print only problems, and what is stale", "also print the name of each test")
+    parser.add_argument("-q", "--quiet", action="store_true", help="print only problems, and what is stale")
     parser.add_argument("--fix", action="store_true",
                         help="with --check: correct names, units and spaces that have exactly one fix")  # fmt: skip
     parser.add_argument("--format", choices=tuple(FORMATS), default="text",
@@ -192,7 +189,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     checked = selection.select(options.path, (), options.application)
     if options.fix:
         checked = _fixed(checked, options, stdout if options.format == "text" else stderr)
-    if options.verbosity is not Verbosity.QUIET:
+    if not options.quiet:
         (stdout if options.format == "text" else stderr).write(selection.left_out(checked))
     if options.check:
         return _check(checked, options, stdout, stderr)
@@ -226,9 +223,7 @@ def _show(diagnostics: Sequence[Diagnostic], style: str, stdout: TextIO, stderr:
         stdout.write(FORMATS[style](diagnostics))
     log = _log(style, stdout, stderr)
     if diagnostics and log:
-        write_diagnostics(log, diagnostics[:_MOST_PROBLEMS])
-        if len(diagnostics) > _MOST_PROBLEMS:
-            log.write(f"... {len(diagnostics) - _MOST_PROBLEMS} more problems\n")
+        write_diagnostics(log, diagnostics)
         rules = {diagnostic.rule for diagnostic in diagnostics}
         log.write(f"dodo explain {rules.pop() if len(rules) == 1 else 'RULE'} says more\n")
 
@@ -252,35 +247,16 @@ def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
         return Exit.USAGE
     outdated = f"{options.output} is stale; dodo compile brings it up to date"
     if log := _log(options.format, stdout, stderr):
-        log.write(_difference(stale, options.output, options.diff))
+        difference = "".join(stale.values()).splitlines(keepends=True)
+        log.write("".join(difference[:_MOST_LINES]))
+        log.write(f"... {len(difference) - _MOST_LINES} more lines\n" if len(difference) > _MOST_LINES else "")
         warnings = [_count(len(diagnostics), "warning")] if diagnostics else []
         state = ", ".join([*warnings, *([outdated] if stale else [])])
-        _list(options, log, "checked", [(spec.title, shown_path(str(spec.path))) for spec in checked.specs])
-        if options.verbosity is not Verbosity.QUIET or stale:
+        if not options.quiet or stale:
             log.write(f"{_count(len(checked.specs))} checked: {state or 'no problems'}\n")
     elif stale:
         stderr.write(f"{outdated}\n")
     return Exit.PROBLEMS if stale else Exit.OK
-
-
-def _list(options: argparse.Namespace, stdout: TextIO, done: str, tests: Sequence[tuple[str, str]]) -> None:
-    """What was done with each test, by name and path, if that is wanted."""
-    if options.verbosity is Verbosity.VERBOSE:
-        width = max((len(name) for name, _ in tests), default=0)
-        stdout.writelines(f"{done} {printable(f'{name:<{width}}  {path}')}\n" for name, path in tests)
-
-
-def _difference(stale: Mapping[str, str], out: Path, in_full: bool) -> str:
-    """The diff if it is wanted or short, otherwise the names of what differs."""
-    text = "".join(stale.values())
-    if in_full or text.count("\n") <= _SHORT_DIFF:
-        return text
-    return f"stale in {out}: {_names(list(stale))}; --diff shows how\n"
-
-
-def _names(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
-    return ", ".join(names[:_MOST_NAMES]) + more
 
 
 def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
@@ -297,12 +273,9 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
         return Exit.USAGE
     gone = [folder.name for folder in stale_folders(made.compiled, options.output)]
     write(made.compiled, made.pipeline, options.output, jobs.images)
-    if options.format == "text" and options.verbosity is not Verbosity.QUIET:
-        plans = made.compiled.suite.plans
-        _list(options, stdout, "compiled", [(plan.name, str(options.output / plan.slug)) for plan in plans])
-        stdout.write(f"{_count(len(plans))} compiled into {options.output}\n")
-        if gone:
-            stdout.write(f"removed {_count(len(gone), 'stale test')}: {_names(gone)}\n")
+    if options.format == "text" and not options.quiet:
+        stdout.write(f"{_count(len(made.compiled.suite.plans))} compiled into {options.output}\n")
+        stdout.write(f"removed {_count(len(gone), 'stale test')}: {', '.join(gone)}\n" if gone else "")
     return Exit.OK
 
 

@@ -73,9 +73,9 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
     report = _usable(options.report, [named(p).slug for p in plans])
     families = {plan.slug: tests.get(plan.slug, named(plan).slug) for plan in plans}
     found: dict[str, Job] = {}
-    for run in runs(plans, settings.repeat):
-        plan = named(run.plan)
-        job = Job(plan, folders[run.test], report / plan.slug, families[run.test], work=folder)
+    for repetition, test in runs(plans, settings.repeat):
+        plan = named(repetition)
+        job = Job(plan, folders[test], report / plan.slug, families[test], work=folder)
         first = found.get(plan.slug)
         found[plan.slug] = replace(first, others=(*first.others, job)) if first else job
     part, parts = options.shard

@@ -1,57 +1,30 @@
-"""The Plans of a run: each test as many times as it is repeated, and for any rig of its pool.
-
-Plans of a test on a pool, one for each rig, are taken together.
-"""
+"""The Plans of a run: each test as many times as it is repeated, and for any rig of its pool."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from dodo_dsl.plan.model import Plan
 
 
-@dataclass(frozen=True)
-class Run:
-    """One repetition of a test; ``test`` is the slug of all its repetitions, and of the compiled folder."""
-
-    plan: Plan
-    test: str
-
-
-def runs(plans: Sequence[Plan], repeat: int) -> list[Run]:
-    """Each Plan ``repeat`` times, round by round; from the second round on, name and slug carry its number."""
-    return [Run(_repetition(plan, number), plan.slug) for number in range(1, repeat + 1) for plan in plans]
+def runs(plans: Sequence[Plan], repeat: int) -> list[tuple[Plan, str]]:
+    """Each Plan ``repeat`` times, round by round, with its own slug; from the second on, name and slug have its number."""
+    return [(_repetition(plan, number), plan.slug) for number in range(1, repeat + 1) for plan in plans]
 
 
 def _repetition(plan: Plan, number: int) -> Plan:
     if number == 1:
         return plan
-    pool = (
-        replace(plan.pool, name=_name(plan.pool.name, number), slug=_slug(plan.pool.slug, number))
-        if plan.pool
-        else None
-    )
-    return replace(plan, name=_name(plan.name, number), slug=_slug(plan.slug, number), pool=pool)
-
-
-def _name(name: str, number: int) -> str:
-    return f"{name}[run={number}]"
-
-
-def _slug(slug: str, number: int) -> str:
-    return f"{slug}--run-{number}"
+    name, slug = f"[run={number}]", f"--run-{number}"
+    pool = plan.pool and replace(plan.pool, name=plan.pool.name + name, slug=plan.pool.slug + slug)
+    return replace(plan, name=plan.name + name, slug=plan.slug + slug, pool=pool)
 
 
 def pooled(plans: Sequence[Plan]) -> list[tuple[Plan, ...]]:
-    """The Plans of each test, of which one is to be run, in the order given."""
+    """The Plans of each test, one for each rig of its pool, of which one is to be run; in the order given."""
     groups: dict[str, list[Plan]] = {}
     for plan in plans:
         groups.setdefault(named(plan).slug, []).append(plan)
     return [tuple(group) for group in groups.values()]
-
-
-def by_test(plans: Sequence[Plan]) -> list[Plan]:
-    """One Plan for each test, under the test's name."""
-    return [named(group[0]) for group in pooled(plans)]
 
 
 def named(plan: Plan) -> Plan:

@@ -3,14 +3,12 @@
 Large files that several tests need stand once, in the folder ``SHARED`` next to the tests; a test has links to them.
 """
 
-import functools
 import hashlib
 import re
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 from dodo_dsl.opendlv import regular_file
 
@@ -20,7 +18,6 @@ SHARED = "_files"
 """No test may be called so."""
 _NAME = re.compile(r"([0-9a-f]{64})-[A-Za-z0-9._-]{1,100}")
 _OTHER = re.compile(r"[^A-Za-z0-9._-]")
-Key = TypeVar("Key", int, str)
 
 
 class FilesError(ValueError):
@@ -41,13 +38,8 @@ class FileCopy:
 
     @property
     def link(self) -> str:
-        """The text of the test's link to the shared file."""
-        return link(self.target, self.shared)
-
-
-def link(target: str, shared: str) -> str:
-    """What a link at ``target`` below ``files/`` says; in containers it leads to ``/SHARED``, from ``/dodo/files``."""
-    return f"{'../' * (target.count('/') + 2)}{SHARED}/{shared}"
+        """The text of the test's link to the shared file; in containers from ``/dodo/files`` to ``/SHARED``."""
+        return f"{'../' * (self.target.count('/') + 2)}{SHARED}/{self.shared}"
 
 
 def is_shared_name(name: str) -> bool:
@@ -56,34 +48,14 @@ def is_shared_name(name: str) -> bool:
 
 
 def standing_once(tests: Mapping[str, Sequence[FileCopy]]) -> dict[str, tuple[FileCopy, ...]]:
-    """The files of tests by slug, with large ones that several need shared; raises OSError.
-
-    Files of one content are one file, whatever they are called.
-    """
-    sizes = {source: source.stat().st_size for source in {copy.source for found in tests.values() for copy in found}}
-    large = {source: size for source, size in sizes.items() if size >= LARGE}
-    by_size = _needed(tests, large)
-    digests = {source: _digest(source) for source, size in large.items() if len(by_size[size]) > 1}
-    by_content = _needed(tests, digests)
-    names: dict[str, str] = {}
-    for source, digest in sorted(digests.items()):
-        if len(by_content[digest]) > 1:
-            names.setdefault(digest, f"{digest}-{_OTHER.sub('_', source.name)[-100:]}")
-    shared = {source: names.get(digest, "") for source, digest in digests.items()}
+    """The files of tests by slug, with large ones that several need shared; raises OSError."""
+    needed = Counter(source for copied in tests.values() for source in {copy.source for copy in copied})
+    large = [source for source, number in needed.items() if number > 1 and source.stat().st_size >= LARGE]
+    names = {source: f"{_digest(source)}-{_OTHER.sub('_', source.name)[-100:]}" for source in large}
     return {
-        slug: tuple(replace(copy, shared=shared.get(copy.source, "")) for copy in copied)
+        slug: tuple(replace(copy, shared=names.get(copy.source, "")) for copy in copied)
         for slug, copied in tests.items()
     }
-
-
-def _needed(tests: Mapping[str, Sequence[FileCopy]], keys: Mapping[Path, Key]) -> Mapping[Key, set[str]]:
-    """The slugs of the tests that need a file with each key."""
-    found: dict[Key, set[str]] = defaultdict(set)
-    for slug, copied in tests.items():
-        for copy in copied:
-            if copy.source in keys:
-                found[keys[copy.source]].add(slug)
-    return found
 
 
 def file_problem(folder: Path, shared: Mapping[str, str]) -> str:
@@ -98,7 +70,6 @@ def file_problem(folder: Path, shared: Mapping[str, str]) -> str:
     return ""
 
 
-@functools.lru_cache(maxsize=256)
 def _digest(path: Path) -> str:
     with regular_file.opened(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -40,17 +40,15 @@ def test_check_says_when_output_is_stale(output: Path) -> None:
 
 
 @pytest.mark.thorough
-def test_a_long_difference_is_shown_with_diff_only(output: Path) -> None:
+def test_a_long_difference_is_cut(output: Path) -> None:
     before = tree(output)
     for name in (CURVE, STRAIGHT):
         (output / name / "action.compose.yml").write_text("# of somebody else\n" * 50)
     (output / "dil-kiwi-track/.env").unlink()
     code, out, _ = run("compile", "--check")
     state = f"{count(output)} tests checked: generated is stale; dodo compile brings it up to date\n"
-    assert (code, out) == (1, f"stale in generated: dil-kiwi-track, {CURVE}, {STRAIGHT}; --diff shows how\n{state}")
-    code, out, _ = run("compile", "--check", "--diff")
-    assert (code, out.count("-# of somebody else\n")) == (1, 100)
-    assert out.endswith(state)
+    assert (code, out.count("\n")) == (1, 102)
+    assert "more lines\n" in out and out.endswith(state)
     assert run("compile")[0] == 0
     assert tree(output) == before
 
@@ -65,7 +63,6 @@ def test_stale_tests_leave_the_output(output: Path) -> None:
     assert (code, first) == (0, "1 test compiled into generated")
     assert second.startswith(f"removed {others} ")
     assert ": dil-kiwi-track, " in second
-    assert second.endswith(f" and {others - 8} more")
     assert sorted(p.name for p in output.iterdir() if p.is_dir()) == ["mine", STRAIGHT]
     assert (output / "mine" / "notes.txt").exists()
     assert run("compile")[0] == 0

@@ -1,4 +1,4 @@
-"""How much ``dodo compile`` says with ``-q`` and ``-v``."""
+"""How much ``dodo compile`` says with ``-q``."""
 
 import io
 import shutil
@@ -42,11 +42,3 @@ def test_quiet_says_what_is_stale_and_what_is_wrong() -> None:
     Path("tests/drive/drive.dodo.yml").write_text(SPEC.replace("level: sil", "level: sli"))
     code, lines = compiled("--check", "-q")
     assert (code, lines[0].split()[1]) == (2, "error[wrong-value]:")
-
-
-def test_verbose_names_each_test() -> None:
-    assert compiled("-v")[1][-2:] == ["compiled drive  generated/drive", "1 test compiled into generated"]
-    assert compiled("--check", "-v")[1][-2:] == [
-        "checked drive  tests/drive/drive.dodo.yml",
-        "1 test checked: no problems",
-    ]
