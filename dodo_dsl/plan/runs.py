@@ -7,7 +7,7 @@ from dodo_dsl.plan.model import Plan
 
 
 def runs(plans: Sequence[Plan], repeat: int) -> list[tuple[Plan, str]]:
-    """Each Plan ``repeat`` times, round by round, with its own slug; from the second on, name and slug have its number."""
+    """Each Plan ``repeat`` times with its slug, round by round; from the second on, its name and slug say which."""
     return [(_repetition(plan, number), plan.slug) for number in range(1, repeat + 1) for plan in plans]
 
 
