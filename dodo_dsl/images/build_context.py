@@ -9,6 +9,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,16 +25,18 @@ _PARTS = ("build/firmware", "build/time", "locks", "schemas", "services", "templ
 """What a checkout has beside the package. The emulated rig, and what gives the test's time, may not be built."""
 
 
-def assemble(folder: Path, wheels: Path | None = None) -> None:
+def assemble(folder: Path, wheels: Sequence[Path] = ()) -> None:
     """Copies what the images are made of into an empty folder, as a checkout has it, and with its dates.
 
     The engine identifies a context by its folder's name and transfers only files whose date has changed.
     """
     parts = {name: package_data.root() / name for name in _PARTS}
-    parts |= {"dodo_dsl": Path(package_data.__file__).parent, **({"wheels": wheels} if wheels else {})}
+    parts["dodo_dsl"] = Path(package_data.__file__).parent
     for name, source in parts.items():
         if source.is_dir():
             shutil.copytree(source, folder / name, ignore=shutil.ignore_patterns("__pycache__", "_data"))
+    for source in wheels:
+        shutil.copytree(source, folder / "wheels", dirs_exist_ok=True)
 
 
 def default_base_image() -> str:

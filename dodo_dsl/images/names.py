@@ -5,7 +5,6 @@ The latter are built each from the ``Dockerfile`` beside its manifest, on a shar
 
 import re
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from platform import machine
 
@@ -26,25 +25,6 @@ BASE_ARGUMENT = "DODO_BASE"
 _DEFAULT = re.compile(rf"^\s*ARG\s+{BASE_ARGUMENT}=[\"']?(?:\S*/)?(?P<name>[\w-]+)(?::\S*)?\s*$", re.MULTILINE | re.I)
 
 
-@dataclass(frozen=True)
-class Series:
-    """Images of one prefix and tag, for one platform: that of the engine if it is empty."""
-
-    prefix: str
-    tag: str
-    platform: str = ""
-
-    def reference(self, name: str) -> str:
-        return f"{self.prefix}/{name}:{self.tag}"
-
-    def each(self, platforms: Sequence[str]) -> list["Series"]:
-        """One for each platform; if there are several, the tag names it: ``1-arm64``."""
-        if len(platforms) < 2:
-            return [Series(self.prefix, self.tag, *platforms)]
-        parts = {platform: platform.partition("/")[2].replace("/", "-") for platform in platforms}
-        return [Series(self.prefix, f"{self.tag}-{part}", platform) for platform, part in parts.items()]
-
-
 def known(manifests: Iterable[Manifest]) -> tuple[str, ...]:
     """The images of DoDo's: the sandbox, those of services and of the ROS bridge, and those for applications.
 
@@ -53,9 +33,13 @@ def known(manifests: Iterable[Manifest]) -> tuple[str, ...]:
     return (*SHARED, *sorted({SANDBOX, *_FOR_X86, *(m.image for m in manifests if m.has_own_image)}))
 
 
-def is_for(name: str, platform: str) -> bool:
-    """Whether an image of DoDo's can be built for a platform, or for this machine without one."""
-    return name not in _FOR_X86 or (platform or machine()) in ("linux/amd64", "x86_64", "AMD64")
+def platforms_of(name: str, wanted: Sequence[str], *, is_named: bool) -> Sequence[str] | None:
+    """For which of the wanted platforms an image of DoDo's is built; None for none, unless it is asked for by name."""
+    if name not in _FOR_X86 or is_named:
+        return wanted
+    if not wanted:
+        return wanted if machine() in ("x86_64", "AMD64") else None
+    return [platform for platform in wanted if platform == "linux/amd64"] or None
 
 
 def dockerfiles(manifests: Iterable[Manifest], shipped: Collection[str]) -> dict[str, Path | None]:

@@ -38,7 +38,7 @@ def test_wheels_and_builds_come_along(tmp_path: Path, monkeypatch: pytest.Monkey
         file.parent.mkdir(parents=True, exist_ok=True)
         file.touch()
     monkeypatch.setattr(package_data, "root", lambda: root)
-    build_context.assemble(tmp_path / "context", wheels)
+    build_context.assemble(tmp_path / "context", [wheels])
     for name in ("build/time/dodo-time", "build/firmware/gantry.elf", "wheels/radar-1.0.whl"):
         assert (tmp_path / "context" / name).is_file()
 
