@@ -32,6 +32,8 @@ _MOST_NAME = 40
 class NotReplaceable(OSError):
     """What is in the place of an output is not replaced, whatever the user says; names it."""
 
+    usage = True
+
 
 def refuse_others(path: Path) -> None:
     """Raises NotReplaceable where a file cannot become ``path``, IsADirectoryError for a folder, and OSError.
@@ -180,6 +182,8 @@ def _naming(path: Path, part: Path) -> Iterator[None]:
 
 class OutputExists(Exception):
     """A result would replace an existing file; one sentence."""
+
+    usage = True
 
 
 def refuse_existing(paths: Iterable[Path], force: bool) -> None:

@@ -44,13 +44,11 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 
 
 def tests(prefix: str = "", **_: Any) -> list[str]:
-    """Names of tests; of a name with a bracket the parameters of its instances; paths of specs and folders."""
+    """Names of tests, or paths of specs and folders."""
     if "/" in prefix:
         from argcomplete.completers import FilesCompleter
 
         return list(FilesCompleter(allowednames=[SUFFIX])(prefix))
-    if "[" in prefix:
-        return list(_instances(prefix))
     return sorted({location.stem for location in locate([], _deployment().registry)[0]})
 
 
@@ -58,12 +56,6 @@ def tests_and_rules(prefix: str = "", **_: Any) -> list[str]:
     from dodo_dsl.check import catalogue
 
     return [*tests(prefix), *catalogue.pages()]
-
-
-def services(**_: Any) -> list[str]:
-    from dodo_dsl.compiler import load
-
-    return sorted(load([]).manifests)
 
 
 def rigs(**_: Any) -> list[str]:
@@ -74,39 +66,14 @@ def _deployment() -> Deployment:
     return load_deployment(find_deployment(Path.cwd()))[0]
 
 
-def _instances(prefix: str) -> Iterator[str]:
-    """The prefix up to its last parameter, with each value of each parameter that is not there yet."""
-    from dodo_dsl.compiler import load
-
-    name = prefix.partition("[")[0]
-    paths = [location.path for location in locate([], _deployment().registry)[0] if location.stem == name]
-    head = prefix[: max(prefix.rfind("["), prefix.rfind(",")) + 1]
-    given = {pair.partition("=")[0] for pair in head.partition("[")[2].split(",")}
-    values: dict[str, dict[str, None]] = {}
-    for spec in load(paths).specs if paths else ():
-        for parameter, value in spec.choice.values:
-            values.setdefault(parameter, {})[value.text] = None
-    left = [parameter for parameter in values if parameter not in given]
-    for parameter in left:
-        for text in values[parameter]:
-            yield f"{head}{parameter}={text}]"
-            if len(left) > 1:
-                yield f"{head}{parameter}={text},"
-
-
-Completer = Callable[..., list[str]]
-_BY_METAVAR: dict[str, Completer] = {
+_COMPLETERS: dict[str, Callable[..., list[str]]] = {
     "TEST": tests,
     "SPEC": tests,
+    "PATH": tests,
     "TEST|RULE": tests_and_rules,
     "RIG": rigs,
 }
-_BY_NAME: dict[tuple[str, str], Completer] = {
-    ("compile", "path"): tests,
-    ("list", "services"): services,
-    ("images", "name"): services,
-}
-"""By command and name of the argument."""
+"""By what an argument is called in the help; all others are completed as files."""
 
 
 def answer() -> None:
@@ -114,9 +81,8 @@ def answer() -> None:
     command = _command(os.environ.get("COMP_LINE", ""))
     known = parser((command,))
     for action in _actions(known):
-        found = _BY_NAME.get((command, action.dest)) or _BY_METAVAR.get(str(action.metavar))
-        if found:
-            action.completer = found  # type: ignore[attr-defined]
+        if completer := _COMPLETERS.get(str(action.metavar)):
+            action.completer = completer  # type: ignore[attr-defined]
     argcomplete.autocomplete(known, always_complete_options=False)
 
 

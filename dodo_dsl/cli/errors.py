@@ -27,6 +27,8 @@ def of_outcomes(outcomes: Iterable[str]) -> Exit:
 class UsageError(Exception):
     """A command line or a file that it names is wrong; one sentence, exit code 2."""
 
+    usage = True
+
 
 def require_extra(what: str, extra: str) -> None:
     """Raises UsageError with what to type where a module of an extra of DoDo's cannot be loaded."""
@@ -46,12 +48,14 @@ def files_of_the_user() -> Iterator[None]:
 
 
 def exit_code(error: Exception) -> Exit | None:
-    """The exit code of an error that its own sentence explains; None for an unexpected one."""
-    if isinstance(error, UsageError) or _is_no_utf8(error):
-        return Exit.USAGE
-    if isinstance(error, _usage_errors()) or getattr(error, "usage", False):
-        return Exit.USAGE
-    return Exit.ERROR if isinstance(error, (OSError, *_machine_errors())) else None
+    """The exit code of an error that its own sentence explains; None for an unexpected one.
+
+    An error with ``usage`` says whether it is of the user's files and words, or of the machine.
+    """
+    usage = getattr(error, "usage", _is_no_utf8(error) or None)
+    if usage is not None:
+        return Exit.USAGE if usage else Exit.ERROR
+    return Exit.ERROR if isinstance(error, OSError) else None
 
 
 def sentence(error: Exception) -> str:
@@ -75,46 +79,3 @@ def _of_no_utf8(error: UnicodeEncodeError) -> str:
     name = re.split(r'["\n]', error.object[begin:], maxsplit=1)[0]
     shown = os.fsencode(name).decode("utf-8", "backslashreplace")
     return f"'{shown}' is not UTF-8, as names of files and folders must be here: rename it"
-
-
-def _usage_errors() -> tuple[type[Exception], ...]:
-    """Errors of the user's files and words."""
-    from dodo_dsl.atomic import NotReplaceable, OutputExists
-    from dodo_dsl.opendlv.odvd import OdvdError
-    from dodo_dsl.opendlv.recording import RecordingError
-    from dodo_dsl.opendlv.regular_file import NotAFile
-    from dodo_dsl.opendlv.ros_codec import RosTypeError
-    from dodo_dsl.plan.test_files import FilesError
-    from dodo_dsl.rec.coco import LabelError
-    from dodo_dsl.rec.frames import FramesError
-    from dodo_dsl.rec.recording_filter import NothingSelected
-    from dodo_dsl.rec.steering import SplitError
-    from dodo_dsl.rec.truth import TruthError
-    from dodo_dsl.report.child_jobs import NoChildJobs
-    from dodo_dsl.report.results import ResultsError
-    from dodo_dsl.spec.registry import RegistryError
-
-    recordings = (
-        RecordingError,
-        OdvdError,
-        NothingSelected,
-        LabelError,
-        FramesError,
-        OutputExists,
-        SplitError,
-        TruthError,
-        NotAFile,
-        RosTypeError,
-        NotReplaceable,
-    )
-    return (*recordings, FilesError, ResultsError, NoChildJobs, RegistryError)
-
-
-def _machine_errors() -> tuple[type[Exception], ...]:
-    """Errors of the machine, its engine, rigs and databases. ``usage`` of a rig's error makes it one of the user."""
-    from dodo_dsl.images.build_context import WheelsError
-    from dodo_dsl.images.docker_command import DockerError
-    from dodo_dsl.run.protocol import BackendError
-    from dodo_dsl.search.store import StorageProblem
-
-    return DockerError, WheelsError, BackendError, StorageProblem

@@ -22,7 +22,26 @@ def ending(outcome: Outcome) -> str:
     return where if outcome.outcome == "passed" else f"{where}: {printable(outcome.reason)}"
 
 
-class PlainProgress:
+class NoProgress:
+    """Shows nothing."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def note(self, text: str) -> None: ...
+
+    def phase(self, slug: str, text: str) -> None: ...
+
+    def standing(self, slug: str, standing: Standing) -> None: ...
+
+    def done(self, outcome: Outcome) -> None: ...
+
+    def rest(self, seconds: float, tests: int) -> None: ...
+
+
+class PlainProgress(NoProgress):
     """A line for each phase, with the seconds since the start of the run."""
 
     def __init__(self, stream: TextIO, slugs: Sequence[str], is_verbose: bool = False) -> None:
@@ -31,12 +50,6 @@ class PlainProgress:
         self.width = max(map(len, slugs), default=0)
         self.start = time.monotonic()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stream.flush()
-
     def note(self, text: str) -> None:
         self.stream.write(f"{printable(text)}\n")
         self.stream.flush()
@@ -44,9 +57,6 @@ class PlainProgress:
     def phase(self, slug: str, text: str) -> None:
         if self.is_verbose or text not in _STEPS:
             self.note(self._head(slug) + text)
-
-    def standing(self, slug: str, standing: Standing) -> None:
-        """Shows nothing: a line for each would be too many."""
 
     def done(self, outcome: Outcome) -> None:
         verdict = (outcome.outcome, display.OF_OUTCOMES[outcome.outcome])
@@ -59,31 +69,6 @@ class PlainProgress:
 
     def rest(self, seconds: float, tests: int) -> None:
         self.note(f"[{time.monotonic() - self.start:6.1f} s] {count(tests)} to go, {about(seconds)}")
-
-
-class NoProgress:
-    """Shows nothing."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-    def note(self, text: str) -> None:
-        pass
-
-    def phase(self, slug: str, text: str) -> None:
-        pass
-
-    def standing(self, slug: str, standing: Standing) -> None:
-        pass
-
-    def done(self, outcome: Outcome) -> None:
-        pass
-
-    def rest(self, seconds: float, tests: int) -> None:
-        pass
 
 
 def count(number: int, what: str = "test") -> str:

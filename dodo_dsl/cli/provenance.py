@@ -7,7 +7,8 @@ import platform
 import shlex
 import subprocess
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -46,73 +47,36 @@ _CONFIGURED = ("-c", "core.fsmonitor=false")
 """No program that the repository names is started."""
 
 
-@dataclass(frozen=True)
-class _Asked:
-    what: str
-    head: "subprocess.Popen[str]"
-    status: "subprocess.Popen[str]"
+def repositories(folders: Mapping[str, Path]) -> tuple[Repository, ...]:
+    """The repositories that have the folders, by what is in them: each once."""
+    found: dict[str, Repository] = {}
+    for what, folder in folders.items():
+        top, _, commit = _git(folder, "rev-parse", "--show-toplevel", "HEAD").partition("\n")
+        if known := found.get(top):
+            found[top] = replace(known, what=f"{known.what} and {what}")
+        elif COMMIT.fullmatch(commit := commit.strip()):
+            found[top] = Repository(what, commit, bool(_git(folder, "status", "--porcelain")))
+    return tuple(found.values())
 
 
-class Asking:
-    """Repositories that git is asked about while the run goes on."""
-
-    def __init__(self, asked: list[_Asked]) -> None:
-        self._asked = asked
-
-    def answers(self) -> tuple[Repository, ...]:
-        """Each repository once, with what is in it; nothing of folders that are in none."""
-        found: dict[str, Repository] = {}
-        for asked in self._asked:
-            top, _, commit = _said(asked.head).partition("\n")
-            if not COMMIT.fullmatch(commit := commit.strip()):
-                continue
-            known = found.get(top)
-            what = f"{known.what} and {asked.what}" if known else asked.what
-            changed = known.changed if known else bool(_said(asked.status))
-            found[top] = Repository(what, commit, changed)
-        return tuple(found.values())
-
-
-@contextlib.contextmanager
-def asking(folders: Mapping[str, Path]) -> Iterator[Asking]:
-    """Asks git about folders by what is in them; what it has not answered by the end is given up."""
-    with contextlib.ExitStack() as stack:
-        asked = []
-        with contextlib.suppress(OSError):  # there is no git
-            for what, folder in folders.items():
-                head = stack.enter_context(_git(folder, "rev-parse", "--show-toplevel", "HEAD"))
-                status = stack.enter_context(_git(folder, "status", "--porcelain"))
-                asked.append(_Asked(what, head, status))
-        yield Asking(asked)
-
-
-@contextlib.contextmanager
-def _git(folder: Path, *words: str) -> Iterator["subprocess.Popen[str]"]:
-    """In its own session, so that Ctrl-C is not for it."""
+def _git(folder: Path, *words: str) -> str:
+    """What git says; empty where it has no answer. It is in its own session, as Ctrl-C is not for it."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
-    process = subprocess.Popen(
-        ["git", "--no-optional-locks", *_CONFIGURED, "-C", str(folder), *words],  # noqa: S607
-        env={**environment, "LC_ALL": "C"},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        encoding="utf-8",
-        errors="replace",
-        start_new_session=True,
-    )
-    with process:
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
-def _said(process: "subprocess.Popen[str]") -> str:
     try:
-        out, _ = process.communicate(timeout=_PATIENCE_S)
-    except subprocess.TimeoutExpired:
+        done = subprocess.run(
+            ["git", "--no-optional-locks", *_CONFIGURED, "-C", str(folder), *words],  # noqa: S607
+            env={**environment, "LC_ALL": "C"},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            encoding="utf-8",
+            errors="replace",
+            start_new_session=True,
+            timeout=_PATIENCE_S,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
         return ""
-    return out if process.returncode == 0 else ""
+    return done.stdout if done.returncode == 0 else ""
 
 
 @dataclass(frozen=True)
@@ -134,5 +98,6 @@ def origin(options: argparse.Namespace, deployment: Deployment) -> Origin:
 def recording(origin: Origin) -> Iterator[Callable[[], RunRecord]]:
     """What makes the record of a run that begins now, at its end."""
     date = datetime.now(UTC).isoformat(timespec="seconds")
-    with asking(origin.folders) as repositories:
-        yield lambda: RunRecord(date, platform.node(), __version__, origin.command, repositories.answers())
+    with ThreadPoolExecutor(1) as beside:
+        asked = beside.submit(repositories, origin.folders)
+        yield lambda: RunRecord(date, platform.node(), __version__, origin.command, asked.result())

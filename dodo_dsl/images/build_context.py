@@ -54,6 +54,8 @@ _QUESTION = "import platform, sys; print(sys.version_info[1], platform.machine()
 class WheelsError(Exception):
     """Wheels that cannot be provided; one sentence."""
 
+    usage = False
+
 
 @dataclass(frozen=True)
 class Python:

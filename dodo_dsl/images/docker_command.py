@@ -13,6 +13,8 @@ from dodo_dsl import advice
 class DockerError(Exception):
     """A part of Docker is missing, or a docker command failed; one sentence."""
 
+    usage = False
+
 
 def _docker() -> str:
     path = shutil.which("docker")

@@ -21,6 +21,8 @@ from dodo_dsl.opendlv import regular_file
 class OdvdError(ValueError):
     """A specification that cannot be used; the text begins with ``file:line:column``."""
 
+    usage = True
+
 
 class TextPlace(NamedTuple):
     """A position in a file; line and column count from 1."""

@@ -218,6 +218,8 @@ _INDEX = np.dtype(
 class RecordingError(ValueError):
     """A file that is not a recording, or that changed while it was read."""
 
+    usage = True
+
 
 def read_envelopes(path: Path, damage: Callable[[Damage], None] | None = None) -> Iterator[Envelope]:
     """The envelopes of a recording in file order; ``damage`` gets what was skipped at the end.

@@ -19,6 +19,8 @@ _KINDS = {
 class NotAFile(OSError):
     """A path of the user that names no regular file; has its name."""
 
+    usage = True
+
 
 def opened(path: Path) -> io.FileIO:
     """A regular file to read, without a buffer; raises NotAFile, IsADirectoryError and OSError."""

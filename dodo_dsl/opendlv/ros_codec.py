@@ -21,6 +21,8 @@ _OCTETS = (4, ((_BASE, ("uint8", 0)), 0))
 class RosTypeError(ValueError):
     """A type that is not known, values that do not fit it, or bytes that are none of it; one sentence."""
 
+    usage = True
+
 
 def require_ros(*modules: str) -> None:
     """Raises RosTypeError where ``modules``, else all of DoDo's extra ``ros``, are not installed."""

@@ -23,6 +23,8 @@ _OTHER = re.compile(r"[^A-Za-z0-9._-]")
 class FilesError(ValueError):
     """Files of a test that cannot be copied."""
 
+    usage = True
+
 
 @dataclass(frozen=True, order=True)
 class FileCopy:

@@ -103,6 +103,8 @@ def class_number(name: str) -> int:
 class LabelError(ValueError):
     """Labels that are missing or cannot be written; one sentence."""
 
+    usage = True
+
 
 def detections(
     recording: Recording, messages: MessageSet, rows: Numbers, sender_stamp: int | None

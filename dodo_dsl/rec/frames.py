@@ -18,6 +18,8 @@ _JPEG_QUALITY = 95
 class FramesError(ValueError):
     """Missing or ambiguous frames; one sentence."""
 
+    usage = True
+
 
 class Packet(NamedTuple):
     """A recorded frame; ``sample_time`` is in microseconds since the epoch, width and height are the message's."""

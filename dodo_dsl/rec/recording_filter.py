@@ -17,6 +17,8 @@ ABSOLUTE_S = 1e8  # seconds from here on are counted since 1970
 class NothingSelected(Exception):
     """A selection that is invalid or without messages; one sentence."""
 
+    usage = True
+
 
 @dataclass(frozen=True)
 class Excerpt:

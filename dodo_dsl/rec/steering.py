@@ -101,6 +101,8 @@ TRAIN, VALIDATION = "train", "validation"
 class SplitError(ValueError):
     """Recordings that cannot be split; one sentence."""
 
+    usage = True
+
 
 def split_recordings(files: Sequence[Path], share: float, seed: int) -> dict[str, list[Path]]:
     """The files by part, in their order; all in one part with the name "" if ``share`` is 0.

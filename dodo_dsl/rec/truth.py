@@ -29,6 +29,8 @@ _LEAST_SHOWN = 1000
 class TruthError(ValueError):
     """Boxes that cannot be the truth of a frame; one sentence."""
 
+    usage = True
+
 
 class Mark(NamedTuple):
     """A box with its class; upper left corner and size in pixels."""

@@ -36,6 +36,8 @@ _MOST_PAGES = 100
 class NoChildJobs(ValueError):
     """Why there are no reports of child pipelines; one sentence."""
 
+    usage = True
+
 
 @dataclass(frozen=True)
 class ParentPipeline:

@@ -72,6 +72,8 @@ _SHOWN_PATH = 60
 class ResultsError(ValueError):
     """A file without results of this version."""
 
+    usage = True
+
 
 @dataclass(frozen=True)
 class Circumstances:

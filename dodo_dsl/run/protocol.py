@@ -216,3 +216,5 @@ Event = Message | VerdictEvent | Malformed | Exited | Unstartable | Lost | Graph
 
 class BackendError(Exception):
     """The test cannot be run here; the text is a sentence."""
+
+    usage = False

@@ -36,6 +36,8 @@ def masked(text: str) -> str:
 class StorageProblem(Exception):
     """The storage cannot be reached, refuses, or went away."""
 
+    usage = False
+
 
 class OtherSearch(Exception):
     """The storage holds what cannot be continued, or its address cannot be read."""

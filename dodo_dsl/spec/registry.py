@@ -20,6 +20,8 @@ MAX_FOLDERS = 10_000
 class RegistryError(Exception):
     """A folder is too large for a registry, or a file is named as DoDo does not read it; one sentence."""
 
+    usage = True
+
 
 def refuse_yaml(path: Path) -> None:
     """Raises RegistryError for a file that is called ``.yaml`` where DoDo reads ``.yml``, if it is there."""

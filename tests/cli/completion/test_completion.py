@@ -47,14 +47,9 @@ def test_a_line_goes_on(line: str, words: list[str]) -> None:
     assert set(words) <= set(asked(line))
 
 
-def test_names_of_services_rigs_and_instances() -> None:
-    assert {"integrator", "virtual-camera"} <= set(completion.services())
+def test_names_of_rigs_and_rules() -> None:
     assert completion.rigs() == ["emulated", "emulated-circle", "kiwi"]
-    assert {"sil-perception[light=1]", "sil-perception[light=1,"} <= set(completion.tests("sil-perception[li"))
-    both = ["sil-perception[light=1,clutter=0]", "sil-perception[light=1,clutter=60]"]
-    assert completion.tests("sil-perception[light=1,clu") == both
-    assert completion.tests("no-such-test[") == []
-    assert "wrong-unit" in completion.tests_and_rules("wrong")
+    assert {"sil-perception", "wrong-unit"} <= set(completion.tests_and_rules(""))
 
 
 def test_specs_are_completed_as_files() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.cli.main import parser
-from dodo_dsl.cli.provenance import Origin, asking, command_line, recording
+from dodo_dsl.cli.provenance import Origin, command_line, recording, repositories
 
 
 def git(folder: Path, *words: str) -> str:
@@ -56,24 +56,20 @@ def test_a_repository_is_known_by_its_commit(repository: Path) -> None:
     (found,) = run.repositories
     assert (found.what, found.commit, found.changed) == ("application and tests", commit, False)
     (repository / "new.yml").write_text("")
-    with asking({"tests": repository}) as asked:
-        assert [one.changed for one in asked.answers()] == [True]
+    assert [one.changed for one in repositories({"tests": repository})] == [True]
 
 
 def test_a_folder_without_a_commit_is_no_repository(tmp_path: Path) -> None:
     git(tmp_path, "init", "-q")
-    with asking({"application": tmp_path / "gone", "tests": tmp_path}) as asked:
-        assert asked.answers() == ()
+    assert repositories({"application": tmp_path / "gone", "tests": tmp_path}) == ()
 
 
 def test_without_git_nothing_is_known(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "/nowhere")
-    with asking({"tests": repository}) as asked:
-        assert asked.answers() == ()
+    assert repositories({"tests": repository}) == ()
 
 
 def test_a_repository_starts_no_program_of_its_own(repository: Path) -> None:
     git(repository, "config", "core.fsmonitor", f"touch {repository / 'started'}; false")
-    with asking({"tests": repository}) as asked:
-        assert len(asked.answers()) == 1
+    assert len(repositories({"tests": repository})) == 1
     assert not (repository / "started").exists()

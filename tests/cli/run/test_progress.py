@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from dodo_dsl.cli.live_table import LiveProgress, Pace
+from dodo_dsl.cli.live_table import LiveProgress
 from dodo_dsl.cli.progress import PlainProgress, about, choose, count
 from dodo_dsl.run.run_state import Standing
 from tests.cli.terminal import SAID, Terminal, shown, wide
@@ -54,33 +54,15 @@ def test_counts_and_forecasts_in_words() -> None:
     assert [about(2.6), about(180), about(200)] == ["about 3 s", "about 180 s", "about 3 min"]
 
 
-def test_a_running_test_has_a_line_with_its_time_and_pace(terminal: Terminal) -> None:
-    clock = [10.0]
-    with LiveProgress(terminal, ["drive", "look", "waits"], lambda: clock[0]) as progress:
+def test_a_running_test_has_a_line_with_its_time(terminal: Terminal) -> None:
+    with LiveProgress(terminal, ["drive", "look"]) as progress:
         for slug in ("drive", "look"):
             progress.phase(slug, "running")
-            progress.standing(slug, Standing(0.0, slug == "drive"))
-        clock[0] = 12.0
-        progress.standing("drive", Standing(7.0, True))
+            progress.standing(slug, Standing(7.0, slug == "drive"))
+        progress.standing("waits", Standing(0.0, True))
     said = [" ".join(line.split()[1:]) for line in re.split(r"[\r\n]+", shown(terminal.getvalue())) if line.strip()]
-    assert said[-2:] == ["drive running 7.0 s x3.5", "look running 2.0 s"]
+    assert said[-2:] == ["drive running 0:00:00 7.0 s of test time", "look running 0:00:00"]
     assert "waits" not in shown(terminal.getvalue())
-
-
-def test_the_time_of_a_test_begins_anew_with_its_next_attempt(terminal: Terminal) -> None:
-    clock = [10.0]
-    with LiveProgress(terminal, ["look"], lambda: clock[0]) as progress:
-        for begin in (10.0, 50.0):
-            clock[0] = begin
-            progress.phase("look", "running")
-            progress.standing("look", Standing(0.0, False))
-        clock[0] = 53.0
-    assert " ".join(shown(terminal.getvalue()).split()).endswith("look running 3.0 s")
-
-
-def test_a_pace_without_time_has_no_factor() -> None:
-    assert Pace(1.0, 1.0, Standing(0.0, True)).text(5.0) == "0.0 s"
-    assert Pace(1.0, 1.0, Standing(2.0, True)).text(5.0) == "2.0 s"
 
 
 PASSED = replace(OUTCOME, slug="other", outcome="passed", reason="drove")
