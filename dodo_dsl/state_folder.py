@@ -75,3 +75,12 @@ def _state_home() -> Path:
 
 def _home() -> Path:
     return Path(os.environ.get("HOME") or pwd.getpwuid(os.getuid()).pw_dir)
+
+
+def cache_home() -> Path:
+    """The folder of a user's caches (XDG Base Directory Specification); a relative path in the variable counts as none.
+
+    Raises KeyError for a user without a home folder.
+    """
+    wanted = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return wanted if wanted.is_absolute() else _home() / ".cache"

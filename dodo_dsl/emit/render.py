@@ -12,7 +12,6 @@ from dodo_dsl.plan.added_services import RECORDER
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.pipeline import SPARE_MINUTES, Pipeline
 from dodo_dsl.plan.plan_json import json_text, to_json
-from dodo_dsl.template_cache import compiled_templates
 
 CHILD = "child.gitlab-ci.yml"
 PLAN_FILE = "test.json"
@@ -72,7 +71,6 @@ def render_pipeline(child: Pipeline) -> File:
 @functools.cache
 def _templates() -> jinja2.Environment:
     environment = jinja2.Environment(
-        bytecode_cache=compiled_templates(),
         loader=jinja2.FileSystemLoader(package_data.templates()),
         undefined=jinja2.StrictUndefined,
         autoescape=False,  # noqa: S701  (YAML, every value of an author goes through a filter)

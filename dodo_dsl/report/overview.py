@@ -25,7 +25,6 @@ from dodo_dsl.report import checks
 from dodo_dsl.report.comparison import KINDS, Comparison
 from dodo_dsl.report.instances import MatrixGrid, compared, grids
 from dodo_dsl.report.results import NO_CIRCUMSTANCES, Circumstances
-from dodo_dsl.template_cache import compiled_templates
 
 
 def machine_line(load: MachineLoad) -> str:
@@ -232,7 +231,6 @@ def style() -> str:
 def environment() -> jinja2.Environment:
     """Renders pages of untrusted texts."""
     return jinja2.Environment(
-        bytecode_cache=compiled_templates(),
         loader=jinja2.FileSystemLoader(package_data.templates()),
         undefined=jinja2.StrictUndefined,
         autoescape=True,

@@ -22,8 +22,7 @@ from dodo_dsl import package_data
 from dodo_dsl.plan.added_services import OWN_TIME, TIME, agent_flags, time_variables
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.protocol import BackendError
-from dodo_dsl.state_folder import secured
-from dodo_dsl.template_cache import cache_home
+from dodo_dsl.state_folder import cache_home, secured
 
 LIBRARY, AGENT = "libdodo-time.so", "dodo-time"
 PAGE_DESTROYED = 3

@@ -14,8 +14,7 @@ from dodo_dsl.plan.model import Application
 from dodo_dsl.plan.test_files import SHARED
 from dodo_dsl.run.application_files import application_paths
 from dodo_dsl.run.process.confinement import INTERPRETER
-from dodo_dsl.state_folder import NoStateFolder, state_path
-from dodo_dsl.template_cache import cache_home
+from dodo_dsl.state_folder import NoStateFolder, cache_home, state_path
 
 _OUTPUT = ("dodo-report", f"generated/{CHILD}")
 """Where earlier runs wrote by default; an application may have another folder 'generated'."""
