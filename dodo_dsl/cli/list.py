@@ -1,19 +1,16 @@
 """dodo list: list the tests and services."""
 
 import argparse
-import os
-import shlex
 from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
-from dodo_dsl import package_data
 from dodo_dsl.cli import display, selection
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, shown_path
-from dodo_dsl.spec.manifest import Manifest, in_words
+from dodo_dsl.spec.manifest import in_words
 from dodo_dsl.spec.model import LEVEL_WORDS, Spec
 from dodo_dsl.terminal import clipped, json_text, printable, width_of
 
@@ -118,21 +115,8 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
     if manifest.checks:
         checks = (f"{check} ({unit})" if unit else check for check, unit in manifest.checks.items())
         lines.append(f"checks: {', '.join(checks)}")
-    if manifest.example is not None:
-        folder = "" if Path("services", "base").is_dir() else f"{package_data.root()}/"
-        example = [word.replace("=tests_registry/", f"={folder}tests_registry/") for word in manifest.example]
-        words = shlex.join([*manifest.process, "--cid=128", *example])
-        lines.append(f"standalone: {_found_by(manifest)}{words}")
     stdout.writelines(f"{printable(line)}\n" for line in lines)
     return Exit.OK
-
-
-def _found_by(manifest: Manifest) -> str:
-    """The variable by which Python finds a service that is run by hand; empty if it does without."""
-    folders = [] if Path("services", "base").is_dir() else [package_data.root()]
-    if not manifest.folder.is_relative_to(package_data.services()):
-        folders.append(manifest.folder.resolve().parents[1])
-    return f"PYTHONPATH={shlex.quote(os.pathsep.join(map(str, folders)))} " if folders else ""
 
 
 def _write_levels(specs: Sequence[Spec], unfolded: bool, stdout: TextIO, width: int | None) -> None:

@@ -147,6 +147,11 @@ class _Builder:
                 self._place(key, span)
         for name, entry in spec.variables.items():
             self._place(f"application.env.{name}", entry.key)
+        for service in self.application.services.values():
+            started = service.node.entries.get("x-dodo-process")
+            span = started.key if started else service.span
+            if not Path(self._shown(Path(span.file))).is_absolute():
+                self._place(f"application.{service.name}", span)
         isolated = isolation(spec, rig)
         setting = Setting(
             self.cid,

@@ -217,10 +217,12 @@ class Plan:
         return {**stepped, **rig, **{name: " ".join(words) for name, words in lists.items() if words}}
 
     def place_named_in(self, text: str) -> Place | None:
-        """Where the spec has the service that a message names; None when it names none."""
-        for service in sorted(self.services, key=lambda s: -len(s.name)):
-            if re.search(rf"(?<![\w-]){re.escape(service.name)}(?![\w-])", text):
-                return self.source_map.get(f"{service.layer}.{service.name}")
+        """Where the spec, or the application's compose file, has the service that a message names; None for none."""
+        keys = {service.name: f"application.{service.name}" for service in self.application.services}
+        keys |= {service.name: f"{service.layer}.{service.name}" for service in self.services}
+        for name in sorted(keys, key=len, reverse=True):
+            if re.search(rf"(?<![\w-]){re.escape(name)}(?![\w-])", text):
+                return self.source_map.get(keys[name])
         return None
 
     def layer(self, name: str) -> tuple[PlannedService, ...]:

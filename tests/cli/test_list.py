@@ -1,9 +1,5 @@
 """``dodo list`` shows what there is, whatever is wrong with some of it."""
 
-import os
-import shlex
-import subprocess
-import sys
 from io import StringIO
 from pathlib import Path
 
@@ -54,40 +50,6 @@ def test_a_parameter_that_another_service_gives_is_not_just_required() -> None:
     assert "  fovy: number, default 48.8 deg; 1 to 170 deg\n" in dodo("list", "--services", "virtual-camera")[1]
     assert "  map-path: path, required unless another service of the test provides it\n" in out
     assert "  message: message, required\n" in dodo("list", "--services", "continuous-signal")[1]
-
-
-@pytest.mark.thorough
-def test_a_service_s_command_works_outside_the_checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert dodo("list", "--services", "integrator")[1].splitlines()[-1].startswith("standalone: python -m services.")
-    monkeypatch.chdir(tmp_path)
-    line = dodo("list", "--services", "integrator")[1].splitlines()[-1].removeprefix("standalone: ")
-    variable, python, *words = shlex.split(line)
-    assert python == "python"
-    environment = dict([variable.split("=", 1)])
-    done = subprocess.run(
-        [sys.executable, *words, "--help"], capture_output=True, text=True, env=environment, check=True
-    )
-    assert "python -m services.integrator" in done.stdout
-    line = dodo("list", "--services", "range-finder")[1].splitlines()[-1]
-    (place,) = [word.partition("=")[2] for word in shlex.split(line) if word.startswith("--map-path=")]
-    assert (Path(place) / "map.json").is_file()
-
-
-@pytest.mark.thorough
-def test_an_own_service_s_command_works_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = tmp_path / "a b/my_services/judge"
-    folder.mkdir(parents=True)
-    (folder.parents[1] / "dodo.yml").write_text("dodo: 1\nservices: [my_services]\n")
-    (folder / "service.yml").write_text(
-        "name: judge\nlayers: [evaluation]\nimage: judge\nprocess: [python, -m, my_services.judge]\n"
-        "description: Judges.\nexample: []\n"
-    )
-    (folder / "__main__.py").write_text("import services.base, sys\nprint(*sys.argv[1:])\n")
-    monkeypatch.chdir(folder)
-    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
-    line = dodo("list", "--services", "judge")[1].splitlines()[-1].removeprefix("standalone: ")
-    done = subprocess.run(line, shell=True, capture_output=True, text=True, cwd=tmp_path, check=True)
-    assert done.stdout == "--cid=128\n"
 
 
 @pytest.mark.thorough
