@@ -218,13 +218,12 @@ def _asked(wiring: Wiring) -> Iterator[dict[str, Any]]:
 
 
 def _file(instances: Sequence[Explanation]) -> str:
-    """The instances of a file together: the first one whole, and what differs in the others."""
-    wired: dict[str, str] = {}
-    for one in instances:
-        wired.setdefault(_wiring(one), one["name"])
-    first, (own, *others) = instances[0], wired
-    parts = [_head(first), _services(first), own, _differences(instances)]
-    return "\n".join(part for part in [*parts, *(f"{printable(wired[other])}\n\n{other}" for other in others)] if part)
+    """The first instance of a file whole, and the names of the others, which hold their values."""
+    first, *others = instances
+    names = [f"  {printable(one['name'])}\n" for one in others[:_MOST_ROWS]]
+    rest = [f"  ... {len(others) - len(names)} more\n"] if len(others) > len(names) else []
+    listed = [f"{len(others)} other instances\n" + "".join([*names, *rest])] if others else []
+    return "\n".join([_head(first), *filter(None, [_services(first)]), _wiring(first), *listed])
 
 
 def _head(one: Explanation) -> str:
@@ -300,23 +299,6 @@ def _declared(asked: dict[str, Any], one: Explanation) -> str:
         return f"declared by {', '.join(asked['declared_by'])}"
     undeclared = ", ".join(one["undeclared"])
     return f"not declared; {undeclared} has no x-dodo and may provide it" if undeclared else "not declared"
-
-
-def _differences(instances: Sequence[Explanation]) -> str:
-    """The values that differ between the instances, one row per instance."""
-    if len(instances) == 1:
-        return ""
-    values = [_flat(one) for one in instances]
-    keys = [key for key in values[0] if len({v.get(key, "") for v in values}) > 1]
-    rows = [[one["name"], *(f"{k}: {v.get(k, '')}" for k in keys)] for one, v in zip(instances, values, strict=True)]
-    rest = f"  ... {len(rows) - _MOST_ROWS} more\n" if len(rows) > _MOST_ROWS else ""
-    return f"the {len(rows)} instances and their differences\n" + _table(rows[:_MOST_ROWS], "  ") + rest
-
-
-def _flat(one: Explanation) -> dict[str, str]:
-    services = {f"{s['name']}.{a['name']}": _value(a) for s in one["services"] for a in s["arguments"]}
-    variables = {v["name"]: v["value"] for v in one["variables"]}
-    return {key: one[key] for key in ("level", "kind", "rig")} | services | variables
 
 
 def _table(rows: Sequence[Sequence[str]], indent: str) -> str:

@@ -6,10 +6,11 @@ kernel's notices. Looking at a thousand files takes some milliseconds.
 """
 
 import argparse
+import contextlib
 import hashlib
 import os
 import time
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import TextIO
 
@@ -42,35 +43,21 @@ def seen(roots: Iterable[Path], skipped: Collection[Path]) -> Seen:
     """The files below the roots but for hidden ones, and those below folders of ``skipped``. All paths are resolved."""
     found: Seen = {}
     for root in roots:
-        for entry in _below(root, skipped):
-            if len(found) == MOST_FILES:
-                return found
-            try:
-                status = entry.stat()
-            except OSError:  # it is gone
-                continue
-            found[Path(entry.path)] = status.st_mtime_ns, status.st_size
+        for place, folders, names in os.walk(root):
+            here = Path(place)
+            folders[:] = [n for n in folders if n[0] != "." and n not in _SKIPPED and here / n not in skipped]
+            for name in (name for name in names if name[0] != "." and name[-1] != "~"):
+                if len(found) == MOST_FILES:
+                    return found
+                with contextlib.suppress(OSError):  # it is gone
+                    status = (here / name).stat()
+                    found[here / name] = status.st_mtime_ns, status.st_size
     return found
 
 
 def saved(before: Seen, after: Seen) -> set[Path]:
     """Files that are new, changed or gone."""
     return {path for path in {*before, *after} if before.get(path) != after.get(path)}
-
-
-def _below(folder: Path, skipped: Collection[Path]) -> Iterator["os.DirEntry[str]"]:
-    try:
-        entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
-    except OSError:
-        return
-    for entry in entries:
-        if entry.name.startswith(".") or entry.name in _SKIPPED or entry.name.endswith("~"):
-            continue
-        if entry.is_dir(follow_symlinks=False):
-            if Path(entry.path) not in skipped:
-                yield from _below(Path(entry.path), skipped)
-        elif entry.is_file():
-            yield entry
 
 
 LOOK_S = 0.3

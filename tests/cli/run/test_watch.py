@@ -164,8 +164,3 @@ def test_links_lead_into_no_other_folder_and_a_missing_folder_is_empty(folder: P
     (folder / "tests" / "up").symlink_to(folder)
     (folder / "dangling").symlink_to("nowhere")
     assert names(folder, seen([folder / "tests", folder / "nowhere"], ())) == ["tests/b.yml"]
-
-
-def test_no_more_files_than_can_be_looked_at(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(watch, "MOST_FILES", 1)
-    assert names(folder, seen([folder], ())) == ["a.py"]
