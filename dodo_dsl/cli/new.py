@@ -5,7 +5,6 @@ import importlib.util
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TextIO
 
@@ -53,39 +52,27 @@ STARTS = {
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 _LONGEST = 60
 _FIRST = "sil-first"
-_ROS_PYTHON = ".ros/bin/python"
-_RUN_COLCON = '"bash", "-c", ". install/setup.bash && exec install/steering/lib/steering/steering"'
-_ROS_SCRIPT = "PATH-OF-DODO'S-CHECKOUT/scripts/install-ros .ros  (or take ROS' own Python, in dodo.yml)"
 _NO_APPLICATION = (
     f"write your application's compose file, and name it in {FILE_NAME}: application: {COMPOSE_FILES[0]}\n"
     "      (dodo new --application, in an empty folder, writes a first application and a test)"
 )
 
 
-@dataclass(frozen=True)
-class Starter:
-    """An application to start from: folders of templates, of which later ones win, and how it is built."""
-
-    folders: Sequence[str]
-    builds: Sequence[str] = ()
-    values: Mapping[str, str] = field(default_factory=dict)
-
-
-def _starters() -> dict[tuple[str, str], Starter]:
-    """By how they answer and by their language."""
-    has_ros = importlib.util.find_spec("rclpy") is not None
-    of_ros = {"process": f"{'python' if has_ros else _ROS_PYTHON}, steering.py", "language": "python"}
-    cmake = ("cmake -B build", "cmake --build build --parallel --target steering")
-    colcon = (". /opt/ros/kilted/setup.bash && colcon build",)
-    return {
-        ("bus", "python"): Starter(("python",)),
-        ("bus", "cpp"): Starter(("cpp",), cmake),
-        ("printed", "python"): Starter(("python", "printed")),
-        ("wheels", "python"): Starter(("python", "wheels")),
-        ("ros", "python"): Starter(("ros", "ros-python"), () if has_ros else (_ROS_SCRIPT,), of_ros),
-        ("ros", "cpp"): Starter(("ros", "ros-cpp"), colcon, {"process": _RUN_COLCON, "language": "cpp"}),
-    }
-
+_STARTERS = {
+    ("bus", "python"): ("python",),
+    ("bus", "cpp"): ("cpp",),
+    ("printed", "python"): ("python", "printed"),
+    ("wheels", "python"): ("python", "wheels"),
+    ("ros", "python"): ("ros", "ros-python"),
+    ("ros", "cpp"): ("ros", "ros-cpp"),
+}
+"""Folders of templates of an application, of which later ones win, by how it answers and by its language."""
+_BUILDS = {
+    "cpp": ("cmake -B build", "cmake --build build --parallel --target steering"),
+    "ros-python": (f"PATH-OF-DODO'S-CHECKOUT/scripts/install-ros .ros  (or take ROS' own Python, in {FILE_NAME})",),
+    "ros-cpp": (". /opt/ros/kilted/setup.bash && colcon build",),
+}
+"""What is to be done before a program of a folder can run."""
 
 EXAMPLES = """examples:
   dodo new                                             lists what a test can start from
@@ -166,14 +153,18 @@ def _application(options: argparse.Namespace, stdout: TextIO) -> int:
     if options.ros and options.answers:
         raise UsageError("--answers applies to OpenDLV applications: with --ros the answer is a Twist")
     kind = ("ros" if options.ros else options.answers or "bus", options.language or "python")
-    starter = _starters().get(kind)
-    if starter is None:
+    if kind not in _STARTERS:
         raise UsageError(f"--answers {kind[0]} is there in Python alone")
-    root = Path.cwd()
-    registry = root / REGISTRY
+    root, has_ros = Path.cwd(), importlib.util.find_spec("rclpy") is not None
     files = {FILE_NAME: _dodo_yml(root, COMPOSE_FILES[0], {})}
-    values = {"base": f"dodo/vision:{__version__}", **starter.values}
-    for folder in starter.folders:
+    colcon = '"bash", "-c", ". install/setup.bash && exec install/steering/lib/steering/steering"'
+    node = f"{'python' if has_ros else '.ros/bin/python'}, steering.py"
+    values = {
+        "base": f"dodo/vision:{__version__}",
+        "language": kind[1],
+        "process": colcon if kind[1] == "cpp" else node,
+    }
+    for folder in _STARTERS[kind]:
         files |= filled_folder(folder, root, **values)
     test = f"{REGISTRY}/{_FIRST}/{_FIRST}{SUFFIX}"
     if test not in files:
@@ -182,9 +173,10 @@ def _application(options: argparse.Namespace, stdout: TextIO) -> int:
         files[".gitignore"] = New(root / ".gitignore", filled("gitignore"))
     if there := compose_file(root):
         raise UsageError(f"'{there}' exists already; nothing was written; name it in {FILE_NAME}: application: {there}")
-    write_new([*files.values(), *world_files(files[test].content, registry)], stdout)
+    write_new([*files.values(), *world_files(files[test].content, root / REGISTRY)], stdout)
     program = next(name for name in files if name.startswith("steering."))
-    say_next([*starter.builds, f"dodo run {_FIRST}", f"edit {program} and the test"], stdout)
+    builds = () if has_ros and kind == ("ros", "python") else _BUILDS.get(_STARTERS[kind][-1], ())
+    say_next([*builds, f"dodo run {_FIRST}", f"edit {program} and the test"], stdout)
     return Exit.OK
 
 
