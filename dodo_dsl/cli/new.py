@@ -83,7 +83,7 @@ EXAMPLES = """examples:
   dodo new dil-bag --level dil --rec bag               the same of a bag of ROS 2
   dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a shipped test and its files
   dodo new --map chicane --line 'straight 1 m, left 45 deg radius 1 m, right 45 deg radius 1 m, straight 1 m'
-  dodo new --map hall --line points.csv --width 80 cm  a map along points, x and y in m
+  dodo new --map hall --line points.csv --width '80 cm'  a map along points, x and y in m
   dodo new --application                               an application that drives, with a test that it passes
   dodo new --application --language cpp                the same in C++, on libcluon
   dodo new --application --ros                         a ROS 2 node, in Python or with --language cpp
@@ -115,7 +115,7 @@ def add(parser: argparse.ArgumentParser) -> None:
                          help="recording, or bag of ROS 2, that a new dil test plays, with its target")  # fmt: skip
     of_map = parser.add_argument_group("of a map")
     of_map.add_argument(
-        "--line", metavar="LINE", help="its centre line, as above, or a CSV file of points, x and y in m"
+        "--line", metavar="LINE", help="its centre line, as below, or a CSV file of points, x and y in m"
     )
     of_map.add_argument("--width", metavar="W", help="width of the track (default: 50 cm)")
     of_map.add_argument("--lap", action="store_true", help="the line ends where it begins")
