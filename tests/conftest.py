@@ -14,7 +14,6 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from dodo_dsl.terminal import WIDE
-from tests import engine
 from tests.faults import Book
 
 settings.register_profile("search", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -26,7 +25,7 @@ for variable in ("NO_COLOR", "FORCE_COLOR"):  # tests say themselves when there 
     os.environ.pop(variable, None)
 os.environ["COLUMNS"] = str(WIDE)  # whatever terminal the tests are started in
 
-REALTIME_RERUNS, REALTIME_REST_S, REALTIME_LIMIT_S = 2, 5, 300
+REALTIME_RERUNS, REALTIME_REST_S, REALTIME_LIMIT_S, ENGINE_LIMIT_S = 2, 5, 300, 400
 HANGS = "from pytest-timeout"
 
 PRIORITIES = {"realtime": -10, "engine": -5}
@@ -55,7 +54,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whatever needs the rig's firmware in its simulator needs real time; that and an engine are slow.
 
     A test in real time has two more tries, as other work on this machine may keep it waiting; none if it hangs. One of
-    an engine has another one, which is for an engine that is stuck alone.
+    an engine has another one, which is for an engine that did not answer.
     """
     for item in items:
         if "firmware" in getattr(item, "fixturenames", ()):
@@ -66,8 +65,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 pytest.mark.flaky(reruns=REALTIME_RERUNS, reruns_delay=REALTIME_REST_S, rerun_except=[HANGS])
             )
         if item.get_closest_marker("engine"):
-            item.add_marker(pytest.mark.timeout(engine.LIMIT_S))
-            item.add_marker(pytest.mark.flaky(reruns=1, only_rerun=engine.STUCK))
+            item.add_marker(pytest.mark.timeout(ENGINE_LIMIT_S))
+            item.add_marker(pytest.mark.flaky(reruns=1, only_rerun=["Read timed out", "TimeoutExpired"]))
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
     if IS_BESIDE_OTHERS:
@@ -96,22 +95,11 @@ def _share_out(items: list[pytest.Item]) -> None:
     items.sort(key=order.__getitem__)
 
 
-FIRST_FAILURE = pytest.StashKey[str]()
-
-
-def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> None:
-    if call.excinfo and item.get_closest_marker("engine"):
-        item.stash[FIRST_FAILURE] = str(item.repr_failure(call.excinfo))
-
-
 def pytest_runtest_setup(item: pytest.Item) -> None:
     if IS_BESIDE_OTHERS:
         wanted = next((nice for mark, nice in PRIORITIES.items() if item.get_closest_marker(mark)), PATIENT)
         with contextlib.suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, 0, wanted)
-    if item.get_closest_marker("engine") and getattr(item, "execution_count", 1) > 1:
-        failure = item.stash.get(FIRST_FAILURE, "")
-        assert engine.is_stuck() and engine.start_anew(), f"the engine was not stuck:\n{failure}"
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -15,19 +15,6 @@ from tests.run.helpers import AFTER_START, PASS, READY, STARTED, WAIT, Bench
 pytestmark = pytest.mark.slow
 TAKES = "held = []\nwhile True:\n    held.append(b'x' * 10_000_000)\n    time.sleep(0.02)\n"
 CHILD_TAKES = f"if os.fork() == 0:\n    exec({TAKES!r})\nos.wait()\n" + WAIT
-LEAVES = """
-import ctypes
-libc = ctypes.CDLL(None)
-libc.shmat.restype = ctypes.c_void_p
-for number in range(20):
-    if os.fork() == 0:
-        memory = libc.shmget(0, 10_000_000, 0o1600)
-        address = libc.shmat(memory, None, 0)
-        ctypes.memset(address, 1, 10_000_000)
-        os._exit(0)
-    os.wait()
-"""
-"""200 MB of System V memory that no process is attached to any more, of creators that have ended."""
 STAYS = """
 if os.fork() == 0:
     os.setsid()
@@ -119,12 +106,3 @@ def test_children_for_which_nobody_waits_are_in_the_account(bench: Bench) -> Non
     (use,) = outcome.resources
     assert use.processor_s > 0.6
     assert outcome.outcome == "failed" and outcome.reason.endswith(" s of processor time, at most 0.6 s")
-
-
-def test_memory_that_it_left_behind_counts(bench: Bench) -> None:
-    """Without a process that is attached to it, or that made it."""
-    plan = bench.plan(judge=READY + WAIT, application=LEAVES + WAIT, timeout_s=30)
-    limits = SandboxLimits(memory=100_000_000)
-    (outcome,) = bench.run(replace(plan, application=replace(plan.application, limits=limits)))
-    assert outcome.outcome == "failed"
-    assert outcome.reason.startswith("application service 'app' ran out of memory")

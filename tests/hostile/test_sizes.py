@@ -22,7 +22,7 @@ from dodo_dsl.opendlv.odvd import OdvdError
 from dodo_dsl.opendlv.picture_size import MAX_PIXELS
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec import truth
-from dodo_dsl.rec.frames import MOST_DECODERS, decoded
+from dodo_dsl.rec.frames import decoded
 from dodo_dsl.rec.truth import TruthError
 from dodo_dsl.run.protocol import Flooded, Noted
 from dodo_dsl.run.run_state import MOST_NOTES, RunState
@@ -153,24 +153,6 @@ def test_frames_that_a_message_calls_too_large_are_not_decoded(record: Callable[
     assert [frame and (frame.width, frame.height) for frame in found] == [None, None, (WIDTH, HEIGHT)]
     (sentence,) = told
     assert sentence.startswith("frames cannot be decoded: an image of 16000 x 16000 pixels, expected at most")
-
-
-@pytest.mark.thorough
-def test_cameras_are_not_counted_without_end(record: Callable[..., Path]) -> None:
-    told: list[str] = []
-    cameras = [image._replace(sender_stamp=number) for number in range(40) for image in video(1)]
-    with Recording(record(cameras)) as recording:
-        frames = [frame for _, frame in decoded(recording, recording.rows(messages=[IMAGE]), told.append)]
-    assert [frame is not None for frame in frames] == [True] * MOST_DECODERS + [False] * (40 - MOST_DECODERS)
-    assert told == [f"frames of more than {MOST_DECODERS} cameras and formats are not decoded"]
-
-
-def test_hidden_folders_and_mounts_are_no_part_of_a_registry(small_disk: Path) -> None:
-    for name in ("a", ".hidden/b", "small/c"):
-        spec = small_disk.parent / name / f"{Path(name).name}.dodo.yml"
-        spec.parent.mkdir(parents=True)
-        spec.touch()
-    assert [found.stem for found in locate([], [small_disk.parent])[0]] == ["a"]
 
 
 class Clock:

@@ -87,9 +87,3 @@ def test_pictures_are_those_of_the_committed_recording(made: Callable[[str], Pat
     assert len(committed) >= 50
     quality = [psnr(one, other) for one, other in zip(again, committed, strict=True)]
     assert min(quality) >= LEAST_PSNR, f"picture {int(np.argmin(quality))} has {min(quality):.1f} dB"
-
-
-@pytest.mark.proof
-def test_two_makings_are_equal_byte_for_byte(made: Callable[[str], Path], tmp_path: Path) -> None:
-    load().make(tmp_path, ("static-rig",))
-    assert (tmp_path / "static-rig.rec").read_bytes() == made("static-rig").read_bytes()
