@@ -12,6 +12,8 @@ from jsonschema import Draft202012Validator
 
 from dodo_dsl.cli.main import main
 from dodo_dsl.report.trajectory import read_ground
+from dodo_dsl.source import parse
+from dodo_dsl.spec.validation import validate
 from services.base.flags import help_text, load_manifest
 
 ROOT = Path(__file__).parents[1]
@@ -167,3 +169,36 @@ def test_the_page_has_every_key_that_a_service_may_have_for_dodo() -> None:
         value = yaml.safe_load(example)
         service = {"image": "example", key: {part: value} if part else value}
         Draft202012Validator(schema).validate({"services": {"app": service}})
+
+
+SCHEMAS = {
+    "machine": {"leases"},
+    "dodo": {"environment", "action", "evaluation"},
+    "deployment": {"registry", "rigs", "application", "sandbox"},
+    "application": {"services"},
+    "service": {"layers"},
+}
+"""By the keys of an example, the first that fits."""
+
+
+def schema_of(text: str) -> str:
+    node = yaml.safe_load(text)
+    return next((name for name, keys in SCHEMAS.items() if isinstance(node, dict) and keys & node.keys()), "")
+
+
+EXAMPLES = [
+    pytest.param(schema, text, id=f"{page.stem}-{number}")
+    for page in sorted((ROOT / "docs").rglob("*.md"))
+    if page.name != "rules.md"  # whose examples are wrong
+    for number, text in enumerate(YAML_BLOCK.findall(page.read_text()))
+    if "\n    ..." not in text and (schema := schema_of(text))
+]
+
+
+@pytest.mark.parametrize(("schema", "text"), EXAMPLES)
+def test_examples_are_valid_as_far_as_they_go(schema: str, text: str) -> None:
+    """What a page leaves out may be missing; whole tests drive in ``contributing/test_tutorial.py``."""
+    node, problems = parse(text, "example.yml")
+    assert node is not None
+    found = [*problems, *(one for one in validate(node, schema) if one.rule != "missing-key")]
+    assert found == []

@@ -3,12 +3,13 @@
 import os
 import re
 import shutil
-import subprocess
 import sys
+from io import StringIO
 from pathlib import Path
 
 import pytest
 
+from dodo_dsl.cli.main import main
 from tests.contributing.tutorial import follow
 from tests.examples.ros import PYTHON, needs_ros
 
@@ -33,7 +34,9 @@ EXAMPLES = ["README.md", "docs/reference/language.md", "docs/reference/maps.md"]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", EXAMPLES)
-def test_the_sample_application_passes_the_test_on_a_page(page: str, tmp_path: Path) -> None:
+def test_the_sample_application_passes_the_test_on_a_page(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """That of docs/reference/maps.md has no head."""
     root = DOCS.parent
     example = next(
@@ -46,6 +49,7 @@ def test_the_sample_application_passes_the_test_on_a_page(page: str, tmp_path: P
     (tmp_path / "tests" / name / f"{name}.dodo.yml").write_text(spec)
     (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\n")
     shutil.copytree(root / "tests_registry" / "maps", tmp_path / "tests" / "maps")
-    command = ["-m", "dodo_dsl", "run", "--application", root / "examples" / "kiwi" / "docker-compose.yml"]
-    done = subprocess.run([sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and "1 passed" in done.stdout, done.stdout + done.stderr
+    monkeypatch.chdir(tmp_path)
+    stdout, compose = StringIO(), root / "examples" / "kiwi" / "docker-compose.yml"
+    assert main(["run", "--application", str(compose)], stdout, stdout) == 0, stdout.getvalue()
+    assert "1 passed" in stdout.getvalue()
