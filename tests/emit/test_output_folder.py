@@ -69,6 +69,7 @@ def test_stale_tests_leave_the_output(output: Path) -> None:
     assert (output / CURVE).is_dir()
 
 
+@pytest.mark.thorough
 def test_files_of_a_test_are_readable_for_users_of_containers(
     generated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -105,6 +105,7 @@ def test_nodes_know_nothing_of_dodo(name: str) -> None:
         assert "dodo" not in file.read_text().lower(), file
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", NODES)
 def test_their_tests_compile(name: str, tmp_path: Path) -> None:
     said = dodo(copy(name, tmp_path), "compile", "--check")

@@ -36,6 +36,7 @@ sys.stdin.read()
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can be two users")
 def test_users_of_a_group_exclude_each_other_and_name_the_holder() -> None:
     """In a folder of root's, as an operator of rigs names it."""

@@ -76,6 +76,7 @@ def test_files_that_cannot_be_used(tmp_path: Path) -> None:
         assert str(raised.value).startswith(f"{path}: ")
 
 
+@pytest.mark.thorough
 @given(st.text() | st.text("message M[id=1]{}float x;,\"'0/*\n"))
 def test_any_text_gives_messages_or_an_error_with_a_place(text: str) -> None:
     try:

@@ -30,6 +30,7 @@ def along(shape, origin, angles, reach):
     return np.where(shapely.is_empty(met), np.inf, shapely.distance(shapely.Point(origin), met))
 
 
+@pytest.mark.thorough
 @given(BODIES, ANGLES, st.floats(0.02, 1.0), st.integers(2, 4096), st.floats(0.5, 9))
 def test_each_ray_meets_what_shapely_says(bodies, first, part, rays, reach):
     """In any field of view, also of more than half a turn, and where it goes on over the first ray."""

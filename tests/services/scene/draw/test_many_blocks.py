@@ -31,6 +31,7 @@ def test_hidden_faces_change_no_pixel(maze: Renderer, monkeypatch: pytest.Monkey
     assert np.array_equal(found[0][..., 3], np.full((180, 320), 255))
 
 
+@pytest.mark.thorough
 def test_few_faces_are_drawn_of_many(maze: Renderer) -> None:
     faces = [face for face in maze._tree.back_to_front(POSES[0].position) if isinstance(face, Face)]
     for pose in POSES:
