@@ -14,7 +14,7 @@ from dodo_dsl.cli.main import main
 from dodo_dsl.report.trajectory import read_ground
 from dodo_dsl.source import parse
 from dodo_dsl.spec.validation import validate
-from services.base.flags import help_text, load_manifest
+from services.base.flags import load_manifest, parser
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -130,10 +130,10 @@ MANIFESTS = sorted(p.parent for p in (ROOT / "services").glob("*/service.yml"))
 @pytest.mark.parametrize("folder", MANIFESTS, ids=lambda p: p.name)
 def test_services_help_ends_with_an_example(folder: Path) -> None:
     manifest = yaml.safe_load((folder / "service.yml").read_text())
-    shown = help_text(load_manifest(folder))
+    shown = parser(load_manifest(folder)).format_help()
     for parameter in manifest["parameters"]:
         assert f"--{parameter}" in shown
-    assert " ".join(manifest["process"]) in shown.splitlines()[-1]
+    assert f"example: {' '.join(manifest['process'])} " in " ".join(shown.split())
     assert (folder / "README.md").is_file()
 
 
