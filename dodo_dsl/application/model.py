@@ -30,7 +30,7 @@ OFFSCREEN = {"QT_QPA_PLATFORM": "offscreen"}
 COMMANDS = ("x-dodo-process", "entrypoint", "command")
 _FALSE = ("false", "f", "0", "no", "n", "off", "")
 
-_ABOUT_NO_MESSAGES = {"tune", "cid", "display", "timed"}
+_ABOUT_NO_MESSAGES = {"tune", "cid", "display"}
 
 
 @dataclass(frozen=True)

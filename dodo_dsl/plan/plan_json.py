@@ -18,7 +18,7 @@ from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.model import LEVELS
 
 FORMAT = 1
-_RARE = frozenset({"lines", "timed", "emulated", "raw_files"})
+_RARE = frozenset({"lines", "emulated", "raw_files"})
 """Keys that are written if there is a value."""
 _PATHS = ("path", "report")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")

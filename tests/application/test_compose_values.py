@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from tests.application.compiled import compiled, repository
-from tests.application.compose_values import RIGHT, RIGHT_FOR_UP, WRONG, WRONG_FOR_UP, compose_file
+from tests.application.compose_values import NO_VOLUMES, RIGHT, WRONG, compose_file
 from tests.emit.readers import compose
 
 
 @pytest.mark.parametrize(
     ("value", "is_right"),
-    [(v, True) for v in (*RIGHT, *RIGHT_FOR_UP)] + [(v, False) for v in (*WRONG, *WRONG_FOR_UP)],
+    [(v, True) for v in RIGHT] + [(v, False) for v in (*WRONG, *NO_VOLUMES)],
 )
 def test_dodo_judges(value: str, is_right: bool, tmp_path: Path) -> None:
     test = compiled(repository(tmp_path, {"data/x": ""}), compose_file(value))

@@ -22,6 +22,8 @@ from tests.run.helpers import READY, STARTED, WAIT, Bench, Recorded
 
 IMAGE = f"dodo/base:{__version__}"
 SANDBOX_IMAGE = f"dodo/sandbox:{__version__}"
+ODD = "a$HOMEb#c%20 'ü\""
+"""The name of a folder; of colons engines want none."""
 MEMORY = {"type": "tmpfs", "device": "tmpfs", "o": "mode=1777"}
 SUBNETS = [f"10.213.{third}.{fourth}/28" for third in range(240, 256) for fourth in range(0, 256, 16)]
 

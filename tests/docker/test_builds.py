@@ -10,8 +10,7 @@ import pytest
 import yaml
 
 from dodo_dsl.run.docker.client import connect
-from tests.docker.compose import IMAGE
-from tests.docker.test_started_anywhere import WITHOUT_COLON
+from tests.docker.compose import IMAGE, ODD
 from tests.drive.applications import dodo, results
 from tests.drive.variants import registry, variant
 from tests.run.desk import ROOT
@@ -21,7 +20,7 @@ pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 
 def test_an_image_keeps_what_its_name_stands_for(tmp_path: Path) -> None:
     """In a folder with an odd name."""
-    tmp_path /= WITHOUT_COLON
+    tmp_path /= ODD
     tmp_path.mkdir()
     spec = variant(registry(tmp_path), "sil-closed-straight", "sil-built")
     name = f"dodo-test-{secrets.token_hex(3)}:1"

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.docker.compose import Crate, changed
-from tests.docker.test_started_anywhere import WITHOUT_COLON
+from tests.docker.compose import ODD, Crate, changed
 from tests.run.desk import ROOT
 from tests.run.faults import MARKS
 from tests.run.helpers import AFTER_START, PASS, READY, WAIT
@@ -65,7 +64,7 @@ def test_default_without_images_of_dodo(tmp_path: Path) -> None:
 
     It writes into a copy of its folder, whose name is odd.
     """
-    tmp_path /= WITHOUT_COLON
+    tmp_path /= ODD
     tmp_path.mkdir()
     for name in (TEST, "maps"):
         shutil.copytree(ROOT / "tests_registry" / name, tmp_path / "tests" / name)

@@ -29,6 +29,7 @@ from tests.run.rigs.place import Place, place
 __all__ = ["place"]
 BARE = {"name": "a", "process": [], "description": "", "example": []}
 NUMBERS = ("1_0", "1e1_0", "١", "１", "0x10", "1 0", "ten", "1-", "1,5", "nan", "inf", "1e999", "²")
+FEW = NUMBERS[::4]
 """Python's ``float`` or ``int`` takes some of these; no person writes them."""
 
 
@@ -76,7 +77,7 @@ PLACES: dict[str, Callable[[str, Path], str]] = {
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("text", NUMBERS)
+@pytest.mark.parametrize("text", FEW)
 @pytest.mark.parametrize("where", PLACES)
 def test_numbers_that_only_python_reads(
     where: str, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
