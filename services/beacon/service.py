@@ -70,6 +70,4 @@ def trajectory_of(flags: Flags) -> Trajectory:
     return straight(flags["x"], flags["y"], height, yaw, flags["length"], flags["speed"])
 
 
-def build(context: Context) -> Service:
-    """The service from its flags."""
-    return Beacon(context)
+build = Beacon

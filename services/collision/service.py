@@ -107,6 +107,4 @@ def _label(name: str, stamp: int | None, requests: Sequence[tuple[str, int | Non
     return name if is_one or stamp is None else f"{name}/{stamp}"
 
 
-def build(context: Context) -> Collision:
-    """The service from its flags."""
-    return Collision(context)
+build = Collision

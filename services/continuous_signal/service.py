@@ -59,9 +59,7 @@ class ContinuousSignal(SignalEvaluator):
         self.take_target(self._target_source.value(message), sample_time)
 
 
-def build(context: Context) -> ContinuousSignal:
-    """The service from its flags; raises ValueError for flags that leave something open."""
-    return ContinuousSignal(context)
+build = ContinuousSignal
 
 
 def _target_signal(flags: Flags, signal: Signal) -> Signal:

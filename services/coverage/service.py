@@ -38,9 +38,7 @@ class Coverage(CoverageEvaluator):
             self._log.warning("ignored a Frame without a position or an attitude, and will ignore all such")
 
 
-def build(context: Context) -> Coverage:
-    """The service from its flags; raises ValueError for flags that leave something open."""
-    return Coverage(context)
+build = Coverage
 
 
 def _area(flags: Flags) -> shapely.Geometry:

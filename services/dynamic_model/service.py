@@ -130,6 +130,4 @@ def _of(car: type[Any], flags: Flags, **others: float) -> Any:
     return car(**named, **others)
 
 
-def build(context: Context) -> Service:
-    """The service from its flags."""
-    return DynamicModel(context)
+build = DynamicModel

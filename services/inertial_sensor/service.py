@@ -98,6 +98,4 @@ class InertialSensor(Service):
             self._log.warning("ignored %s, and will ignore all such", what)
 
 
-def build(context: Context) -> InertialSensor:
-    """The service from its flags."""
-    return InertialSensor(context)
+build = InertialSensor

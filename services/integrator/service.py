@@ -64,6 +64,4 @@ def start(flags: Flags) -> BodyPose:
     return BodyPose((float(flags["x"]), float(flags["y"]), float(flags["z"])), quaternion(*angles))
 
 
-def build(context: Context) -> Service:
-    """The service from its flags."""
-    return Integration(context)
+build = Integration

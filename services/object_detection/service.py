@@ -42,9 +42,7 @@ class ObjectDetection(DetectionEvaluator):
         self.announce(FrameKey(sample_time, message.sampleId), by_application)
 
 
-def build(context: Context) -> ObjectDetection:
-    """The service from its flags; raises ValueError for flags that leave something open."""
-    return ObjectDetection(context)
+build = ObjectDetection
 
 
 def _handlers(sender: int, take: Take) -> dict[tuple[str, int | None], Handler]:

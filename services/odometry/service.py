@@ -42,6 +42,4 @@ class Odometry(Service):
             self._odometer = Odometer(self._errors, self._seed)
 
 
-def build(context: Context) -> Odometry:
-    """The service from its flags."""
-    return Odometry(context)
+build = Odometry

@@ -1,7 +1,6 @@
 """The projected truth on the bus: boxes for each picture of a camera that somebody else takes."""
 
 import logging
-import math
 from collections import deque
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -12,8 +11,8 @@ import cv2
 from dodo_dsl.opendlv.envelope import MICROSECONDS
 from services.base import Context, Flags, Output, Service
 from services.projected_truth.path import FollowedMemory, MeasuredPath
-from services.scene.camera import CameraFrame, CameraPose, Pinhole, body_pose, mount
-from services.scene.lens import Alignment, Distortion, Lens, lens_of
+from services.scene.camera import CameraFrame, CameraPose, body_pose, mount
+from services.scene.lens import Lens, camera_of, lens_of
 from services.scene.render import Renderer
 from services.scene.scene import SceneOptions, load_scene
 from services.scene.truth import TruthSender, truth_sender
@@ -117,9 +116,7 @@ def build(context: Context) -> Service:
 
 
 def _open(flags: Flags) -> tuple[Renderer, Lens | None]:
-    camera = Pinhole(flags["width"], flags["height"], math.radians(flags["fovy"]))
-    distortion = Distortion(*(flags[f"distortion.{name}"] for name in ("k1", "k2", "p1", "p2")))
-    alignment = Alignment(*(flags[name] for name in ("focal-x", "centre-x", "centre-y")))
+    camera, distortion, alignment = camera_of(flags)
     lens = lens_of(camera, distortion, alignment)
     wide = lens.wide if lens else camera
     scene = load_scene(Path(flags["map-path"]), SceneOptions(own=flags["frame-id"]))

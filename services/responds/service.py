@@ -29,9 +29,7 @@ class Responds(ResponseEvaluator):
         self.take({field: float(getattr(message, field)) for field in self._fields}, sample_time)
 
 
-def build(context: Context) -> Responds:
-    """The service from its flags; raises ValueError for flags that leave something open."""
-    return Responds(context)
+build = Responds
 
 
 def _frames(flags: Flags) -> Frames:

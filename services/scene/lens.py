@@ -11,6 +11,7 @@ from dataclasses import astuple, dataclass
 import cv2
 import numpy as np
 
+from services.base import Flags
 from services.scene.camera import Array, Pinhole
 from services.scene.raster import Image
 
@@ -76,6 +77,13 @@ class Alignment:
         focal = np.array([camera.focal if self.focal_x is None else self.focal_x, camera.focal])
         written = zip((self.centre_x, self.centre_y), camera.centre, strict=True)
         return focal, np.array([middle if value is None else value for value, middle in written])
+
+
+def camera_of(flags: Flags) -> tuple[Pinhole, Distortion, Alignment]:
+    """The ideal camera, what its lens distorts, and where its chip is, by a service's flags."""
+    camera = Pinhole(flags["width"], flags["height"], math.radians(flags["fovy"]))
+    distortion = Distortion(*(flags[f"distortion.{name}"] for name in ("k1", "k2", "p1", "p2")))
+    return camera, distortion, Alignment(*(flags[name] for name in ("focal-x", "centre-x", "centre-y")))
 
 
 def lens_of(camera: Pinhole, distortion: Distortion, alignment: Alignment) -> "Lens | None":

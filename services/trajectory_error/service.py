@@ -155,9 +155,7 @@ class TrajectoryError(Evaluator):
         return f"at {self.elapsed(time + self._shift):.2f} s"
 
 
-def build(context: Context) -> TrajectoryError:
-    """The service from its flags; raises ValueError for flags that leave something open."""
-    return TrajectoryError(context)
+build = TrajectoryError
 
 
 def _row(pose: Any) -> list[float] | None:

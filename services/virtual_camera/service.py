@@ -9,8 +9,8 @@ import cv2
 
 from services.base import Context, Flags, Output, Service, period_of
 from services.base.pictures import memories, show
-from services.scene.camera import CameraPose, Pinhole, mount
-from services.scene.lens import Alignment, Distortion
+from services.scene.camera import CameraPose, mount
+from services.scene.lens import camera_of
 from services.scene.render import Renderer
 from services.scene.scene import Scene, SceneOptions, load_scene
 from services.scene.shading import Light
@@ -55,11 +55,9 @@ def _scene(flags: Flags) -> Scene:
 
 
 def _optics(flags: Flags, scene: Scene) -> Optics:
-    camera = Pinhole(flags["width"], flags["height"], math.radians(flags["fovy"]))
-    distortion = Distortion(*(flags[f"distortion.{name}"] for name in ("k1", "k2", "p1", "p2")))
+    camera, distortion, alignment = camera_of(flags)
     sensor = Sensor(flags["exposure"], flags["gain"], flags["noise"], flags["seed"])
     overlays = list(load_overlays(scene.overlays, camera.width, camera.height))
-    alignment = Alignment(*(flags[name] for name in ("focal-x", "centre-x", "centre-y")))
     return Optics(camera, distortion, sensor, overlays, flags["shutter"], alignment)
 
 
