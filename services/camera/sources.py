@@ -14,7 +14,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -37,36 +37,32 @@ class FileCamera:
         """Pictures are scaled to ``width`` and ``height``; raises ValueError or OSError for a file without any."""
         if not path.is_file():
             raise OSError(f"there is no file '{path}'")
-        self._path, self._size = path, (width, height)
-        self._still = still(path)
-        first = next(self._begun(), None)
+        self._size, pictures = (width, height), repeated(path)
+        first = next(pictures, None)
         if first is None:
             raise ValueError(f"{path} has no pictures, expected an image, a video or a recording")
-        self._left = chain([first], self._skipped()) if self._still is None else iter(())
+        self._pictures: Iterator[Image] = chain([first], pictures)
 
     def read(self) -> SharedPicture:
         """The next picture, without a time."""
-        if self._still is not None:
-            return from_bgr(self._still, *self._size)
-        picture = next(self._left, None)
-        if picture is None:
-            self._left = self._begun()
-            picture = next(self._left)
-        return from_bgr(picture, *self._size)
+        return from_bgr(next(self._pictures), *self._size)
 
     def close(self) -> None:
         """Close the file."""
-        self._left = iter(())
+        self._pictures = iter(())
 
-    def _begun(self) -> Iterator[Image]:
-        if self._still is not None:
-            return iter([self._still])
-        return recorded(self._path) if self._path.suffix == RECORDING else filmed(self._path)
 
-    def _skipped(self) -> Iterator[Image]:
-        pictures = self._begun()
-        next(pictures)
-        return pictures
+def repeated(path: Path) -> Iterator[Image]:
+    """The pictures of a file, as B, G, R, again and again; none of one that has none."""
+    picture = still(path)
+    if picture is not None:
+        yield from repeat(picture)
+    is_there = True
+    while is_there:
+        is_there = False
+        for picture in recorded(path) if path.suffix == RECORDING else filmed(path):
+            is_there = True
+            yield picture
 
 
 def still(path: Path) -> Image | None:
@@ -279,10 +275,8 @@ class RpiCamera:
 
         Raises ValueError for a width that the pipe pads, OSError if there is no program.
         """
-        if width % ALIGNED or height % 2:
-            raise ValueError(
-                f"expected a width that is a multiple of {ALIGNED} and an even height, not {width} x {height}"
-            )
+        if width % ALIGNED:
+            raise ValueError(f"expected a width that is a multiple of {ALIGNED}, not {width}")
         if shutil.which(PROGRAM) is None:
             raise OSError(f"there is no program '{PROGRAM}' on PATH, expected it from the package rpicam-apps")
         self._shape, self._size = (height * 3 // 2, width), width * height * 3 // 2
