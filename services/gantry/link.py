@@ -8,9 +8,9 @@ import os
 import select
 import termios
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import serial
 
@@ -23,22 +23,6 @@ WRITE_PATIENCE = 0.2
 
 class PortError(ValueError):
     """A port that cannot be used; one sentence."""
-
-
-class SerialLine(Protocol):
-    """A line of bytes; both raise OSError when it is lost."""
-
-    def write(self, data: bytes) -> None:
-        """Send all bytes."""
-        ...
-
-    def read(self, timeout: float) -> bytes:
-        """What is there, or what comes first within ``timeout`` seconds; empty when nothing does."""
-        ...
-
-    def close(self) -> None:
-        """Close the port."""
-        ...
 
 
 class SerialPort:
@@ -57,10 +41,12 @@ class SerialPort:
         _keep(target, self._port)
 
     def write(self, data: bytes) -> None:
+        """Send all bytes; raises OSError when the line is lost, and so does reading."""
         with _as_os_errors():
             self._port.write(data)
 
     def read(self, timeout: float) -> bytes:
+        """What is there, or what comes first within ``timeout`` seconds; empty when nothing does."""
         with _as_os_errors():
             if not select.select([self._port.fileno()], [], [], max(timeout, 0.0))[0]:
                 return b""
@@ -133,20 +119,13 @@ class Link:
     It sends nothing on its own, so that a fault can still be read when the line is opened.
     """
 
-    def __init__(
-        self,
-        name: str,
-        open_port: Callable[[], SerialLine],
-        now: Callable[[], float] = time.monotonic,
-        conversion: Conversion | None = None,
-    ) -> None:
-        """``now`` in s; the line is opened by the first exchange. Positions that it gives are true ones."""
+    def __init__(self, name: str, conversion: Conversion | None = None) -> None:
+        """The line is opened by the first exchange. Positions that it gives are true ones."""
         self.name = name
         self.conversion = conversion or Conversion()
-        self._open, self._now = open_port, now
-        self._port: SerialLine | None = None
+        self._port: SerialPort | None = None
         self._lines = LineReader()
-        self._last_state = self._retry = now()
+        self._last_state = self._retry = time.monotonic()
         self._found = False
         self._status: Status | None = None
 
@@ -170,7 +149,7 @@ class Link:
             self._let_go()
             self._miss(error.strerror or str(error))
             return LinkAnswers()
-        if self._now() - self._last_state > SILENCE:
+        if time.monotonic() - self._last_state > SILENCE:
             self._miss("it does not answer")
         return answers._replace(refusals=(*(a for a in late if isinstance(a, Refusal)), *answers.refusals))
 
@@ -181,7 +160,7 @@ class Link:
         """
         reason = "it does not answer"
         try:
-            port, self._port = self._port or self._open(), None
+            port, self._port = self._port or SerialPort(self.name), None
             with contextlib.closing(port):
                 if self._status in LATCHED:
                     return
@@ -193,12 +172,12 @@ class Link:
             reason = str(error)
         _log.warning("the rig at %s did not confirm that it stopped: %s", self.name, reason)
 
-    def _answers(self, port: SerialLine, patience: float) -> LinkAnswers:
+    def _answers(self, port: SerialPort, patience: float) -> LinkAnswers:
         at, status, limits, refusals = None, None, None, []
-        end = self._now() + patience
-        while status is None and (left := end - self._now()) > 0:
+        end = time.monotonic() + patience
+        while status is None and (left := end - time.monotonic()) > 0:
             for answer in self._lines.feed(port.read(left)):
-                self._last_state, self._found = self._now(), True
+                self._last_state, self._found = time.monotonic(), True
                 if isinstance(answer, Position):
                     at = self.conversion.to_true(answer)
                 elif isinstance(answer, Status):
@@ -210,12 +189,12 @@ class Link:
         return LinkAnswers(at, status, tuple(refusals), limits)
 
     def _opened(self) -> bool:
-        now = self._now()
+        now = time.monotonic()
         if now < self._retry:
             return False
         self._retry = now + RETRY
         try:
-            self._port, self._lines = self._open(), LineReader()
+            self._port, self._lines = SerialPort(self.name), LineReader()
         except OSError as error:
             if now - self._last_state > PATIENCE:
                 raise PortError(
@@ -228,7 +207,7 @@ class Link:
         """The line is lost, or has not been found yet."""
         if self._found:
             raise RigError(f"the line to the rig at {self.name} is lost: {reason}")
-        if self._now() - self._last_state > PATIENCE:
+        if time.monotonic() - self._last_state > PATIENCE:
             raise RigError(f"the rig at {self.name} gave no answer for {PATIENCE:g} s: {reason}")
 
     def _let_go(self) -> None:

@@ -24,7 +24,7 @@ from services.base.flags import load_manifest, parse
 from services.base.process import interruptible, stop_without_master
 from services.gantry import memory, start
 from services.gantry.emulator import EmulatedRig
-from services.gantry.link import REQUEST_STATE, Link, RigError, SerialPort, checked
+from services.gantry.link import REQUEST_STATE, Link, RigError, checked
 from services.gantry.memory import conversion_of, kept_limits, true_box
 from services.gantry.motion import Conversion, MotionLimits
 from services.gantry.protocol import Position, Word
@@ -217,7 +217,7 @@ def _done(
         stop_without_master()
         emulated = resources.enter_context(EmulatedRig(kind=flags["kind"])) if flags["serial"] == EMULATED else None
         target = checked(emulated.port if emulated else flags["serial"])
-        link = Link(target, lambda: SerialPort(target), conversion=conversion_of(flags))
+        link = Link(target, conversion=conversion_of(flags))
         resources.callback(link.close)
         if action == "check":
             try:

@@ -11,7 +11,7 @@ from services.base import Context, Output, Service, period_of
 from services.base.process import interruptible
 from services.gantry import memory, start
 from services.gantry.emulator import EmulatedRig
-from services.gantry.link import REQUEST_STATE, Link, PortError, RigError, SerialPort, checked
+from services.gantry.link import REQUEST_STATE, Link, PortError, RigError, checked
 from services.gantry.memory import conversion_of, kept_limits, motion_limits
 from services.gantry.motion import Shaper, Velocity
 from services.gantry.protocol import SENTENCES, Position, Refusal, Word, command
@@ -174,7 +174,7 @@ def build(context: Context) -> Service:
     goal = Position(flags["x"], flags["y"], math.radians(flags["yaw"]))
     if not motion_limits(flags).holds(goal):
         raise PortError(f"the start is out of the rig's ranges: {place(goal)}")
-    link = Link(target, lambda: SerialPort(target), conversion=conversion_of(flags))
+    link = Link(target, conversion=conversion_of(flags))
     context.resources.callback(link.close)
     with interruptible():
         status = start.find(link)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from services.gantry import manual, memory, start
-from services.gantry.link import Link, RigError, SerialPort
+from services.gantry.link import Link, RigError
 from services.gantry.manual import INDEX, find_home, run_checks
 from services.gantry.memory import wanted
 from services.gantry.motion import Conversion, MotionLimits, Shaper, Velocity, box
@@ -25,7 +25,7 @@ def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Fake
     monkeypatch.setattr(manual, "REPEATS", dict.fromkeys(("x", "y", "yaw"), 1.0))
     with FakeRig(tmp_path / "rig") as rig:
         rig.turn = True
-        link = Link(str(rig.path), lambda: SerialPort(str(rig.path)), conversion=Conversion(circle=True))
+        link = Link(str(rig.path), conversion=Conversion(circle=True))
         yield rig, link
         link.close()
 

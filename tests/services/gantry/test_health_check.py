@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from services.gantry import manual
-from services.gantry.link import Link, RigError, SerialPort
+from services.gantry.link import Link, RigError
 from services.gantry.manual import find_home, read_state, run_checks
 from services.gantry.memory import wanted
 from services.gantry.motion import Conversion, MotionLimits
@@ -18,7 +18,7 @@ def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> "tuple[FakeRig, Lin
     monkeypatch.setattr(manual, "ROUNDS", 3)
     monkeypatch.setattr(manual, "TRIES", 1)
     with FakeRig(tmp_path / "rig") as rig:
-        link = Link(str(rig.path), lambda: SerialPort(str(rig.path)))
+        link = Link(str(rig.path))
         yield rig, link
         link.close()
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from services.gantry import memory
-from services.gantry.link import Link, PortError, RigError, SerialPort
+from services.gantry.link import Link, PortError, RigError
 from services.gantry.memory import agree, wanted
 from services.gantry.motion import Conversion
 from services.gantry.protocol import Limits, answer
@@ -23,7 +23,7 @@ MOVES = {"GOTO", "CALIBRATE", "RUN"}
 @pytest.fixture
 def line(tmp_path: Path) -> Iterator[tuple[FakeRig, Link]]:
     with FakeRig(tmp_path / "rig") as rig:
-        link = Link(str(rig.path), lambda: SerialPort(str(rig.path)))
+        link = Link(str(rig.path))
         yield rig, link
         link.close()
 

@@ -17,7 +17,7 @@ from dodo_dsl.opendlv.session import Session
 from services.base import Context
 from services.base.flags import load_manifest, parse
 from services.gantry import link, start
-from services.gantry.link import Link, RigError, SerialPort
+from services.gantry.link import Link, RigError
 from services.gantry.service import Gantry
 from tests.services.built import built, hand, refusal
 from tests.services.gantry.fake_rig import FakeRig
@@ -170,7 +170,7 @@ def test_a_rig_that_never_answers(rig: FakeRig, monkeypatch: pytest.MonkeyPatch)
 
 def test_who_moves_the_vehicle_and_who_runs_the_test_may_not_fall_silent(rig: FakeRig) -> None:
     flags = parse(MANIFEST, ["--cid=1", f"--serial={rig.path}", "--freq=10"])
-    line, now = Link(str(rig.path), lambda: SerialPort(str(rig.path))), [100.0]
+    line, now = Link(str(rig.path)), [100.0]
     with contextlib.closing(line):
         start.settle(line, start.find(line))
         model = Gantry(Context("gantry", flags, MessageSet.standard()), line, wall=lambda: now[0])
@@ -269,7 +269,7 @@ def test_what_is_not_a_rig(
 
 def test_the_rigs_frame_in_the_world(rig: FakeRig) -> None:
     flags = parse(MANIFEST, ["--cid=1", f"--serial={rig.path}", "--origin-x=5", "--origin-y=1", "--origin-yaw=90"])
-    line = Link(str(rig.path), lambda: SerialPort(str(rig.path)))
+    line = Link(str(rig.path))
     with contextlib.closing(line):
         model = Gantry(Context("gantry", flags, MessageSet.standard()), line)
         outputs = [output for now in range(20) for output in model.update(now)]
