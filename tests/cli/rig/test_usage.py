@@ -1,13 +1,12 @@
 """``dodo rig`` without a rig; with one it is tested where rigs run."""
 
-import argparse
 from io import StringIO
 from pathlib import Path
 
 import pytest
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.rig import ACTIONS, _sentence, add
+from dodo_dsl.cli.rig import _sentence
 from dodo_dsl.run.rigs import access
 from dodo_dsl.spec.deployment import load_deployment
 
@@ -37,13 +36,6 @@ def test_an_unknown_rig_and_those_that_are_known(folder: Path) -> None:
         "dodo rig: unknown rig 'dask', expected one of emulated, emulated-circle, desk\n",
     )
     assert rig("home", "desk") == (2, "", "dodo rig: rig 'desk' has no serial port, so it cannot move\n")
-
-
-def test_a_deployment_with_errors_is_shown_with_all_of_them(folder: Path) -> None:
-    (folder / "dodo.yml").write_text("dodo: 1\nrigs: {desk: {kind: stattic}}\ngates: 1\n")
-    code, out, err = rig("status")
-    assert (code, out, err.splitlines()[0]) == (2, "", "dodo rig: dodo.yml has problems:")
-    assert err.count("error[") >= 2 and not err.endswith("\n\n")
 
 
 def test_constants_of_the_rig_are_flags_of_the_gantry(folder: Path) -> None:
@@ -79,12 +71,3 @@ def test_a_result_in_words() -> None:
     assert _sentence({"rig": "desk", "quarantine": ""}) == "desk: not in quarantine"
     broken = {"rig": "desk", "quarantine": "belt", "error": "no answer"}
     assert _sentence(broken) == "desk: no answer; in quarantine: belt; 'dodo rig clear desk' ends it"
-
-
-@pytest.mark.parametrize("action", [*ACTIONS, "truth", "measure"])
-def test_every_action_has_help(action: str, capsys: pytest.CaptureFixture[str]) -> None:
-    parser = argparse.ArgumentParser(prog="dodo rig")
-    add(parser)
-    with pytest.raises(SystemExit, match="0"):
-        parser.parse_args([action, "--help"])
-    assert "--wait S" in capsys.readouterr().out

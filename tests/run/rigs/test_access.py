@@ -3,14 +3,12 @@
 import asyncio
 import os
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run import leases
 from dodo_dsl.run.rigs import access
-from dodo_dsl.run.rigs.access import occupied, query
+from dodo_dsl.run.rigs.access import query
 from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
 
 PYTHON = (sys.executable, "-c")
@@ -71,24 +69,3 @@ time.sleep(600)
 
     asyncio.run(scene())
     assert (tmp_path / "stopped").exists()
-
-
-@pytest.mark.thorough
-def test_a_rig_in_use_is_waited_for_and_then_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("DODO_LEASES", str(tmp_path))
-    held = leases.try_lease("cid-121", {"test": "hil-other"})
-    assert held is not None
-    said: list[str] = []
-    command = (PYTHON, ["print({})"])
-    with (
-        pytest.raises(leases.LeaseTimeout, match=r"no cid came free within 0\.1 s; test hil-other"),
-        occupied(121, "'dodo rig home'", [], said.append, 0.1),
-    ):
-        raise AssertionError("it is held")
-    assert said == [f"waiting for test hil-other of process {os.getpid()}"]
-    held.release()
-    began = time.monotonic()
-    with occupied(121, "'dodo rig home'", [], said.append, leases.DEFAULT_PATIENCE_S) as ask:
-        assert ask(command) == ask(command) == {}
-    assert (len(said), time.monotonic() - began < leases.DEFAULT_PATIENCE_S) == (1, True)
-    assert list(tmp_path.glob("*.lease")) == []

@@ -1,8 +1,6 @@
 """Constants that were measured on a rig: true places in commands and reports of the firmware."""
 
-import json
 import math
-from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -17,7 +15,6 @@ from services.gantry.memory import conversion_of, kept_limits, motion_limits, tr
 from services.gantry.motion import BUILT_IN, FARTHEST, HOME, AxisConstants, Conversion, MotionLimits, box
 from services.gantry.protocol import Position
 from services.gantry.rig_table import CIRCLE_YAW
-from tests.services.gantry.fake_rig import FakeRig
 
 FOLDER = Path(manual.__file__).parent
 LONG = Conversion({"x": AxisConstants(3320 / 1.03, 2988 - 0.007 * 3320 / 1.03)})
@@ -120,14 +117,3 @@ def test_the_yaw_of_a_circle_has_an_offset_only() -> None:
     for words in (("--kind=circle", "--steps-yaw=0.55"), ("--kind=circle", "--offset-yaw=83"), ("--offset-yaw=100",)):
         with pytest.raises(PortError, match=r"circle has no steps|expected 89 to 111|expected 72 to 94"):
             conversion_of(flags_of(*words))
-
-
-def test_manual_moves_to_true_places_and_says_the_steps(tmp_path: Path) -> None:
-    words = ["--steps-x=3223.300971", "--offset-x=2965.436893", "goto", "0.522", "0", "0"]
-    output = StringIO()
-    with FakeRig(tmp_path / "rig") as rig:
-        assert manual.main([f"--serial={rig.path}", *words], output) == 0
-        (told,) = rig.commands("GOTO")
-    assert told == pytest.approx((0.5, 0, 0), abs=1e-6)
-    result = json.loads(output.getvalue())
-    assert result["x"] == pytest.approx(0.522, abs=1e-5) and result["steps"]["x"] == pytest.approx(4648, abs=0.01)
