@@ -48,12 +48,13 @@ OUTPUT = "--output="
 
 def snapshot(
     argv: Sequence[str], stdout: TextIO, take: Callable[[list[str]], tuple[pixels.Picture, dict[str, Any]]]
-) -> dict[str, Any]:
+) -> int:
     """Write what ``take`` makes of the words as the PNG of ``--output``, and print its facts, width and height.
 
-    A picture that cannot be taken or written has an ``error`` instead. ``take`` may raise ValueError, OSError and
-    RuntimeError.
+    Exit codes: 0 done, 1 the picture cannot be taken or written, 2 the words are wrong; ``error`` says why. ``take``
+    may raise ValueError for these, OSError and RuntimeError.
     """
+    code = 0
     outputs = [word.removeprefix(OUTPUT) for word in argv if word.startswith(OUTPUT)]
     try:
         if len(outputs) != 1:
@@ -62,6 +63,6 @@ def snapshot(
         Path(outputs[0]).write_bytes(png(picture[..., :3]))
         result = {**facts, "width": picture.shape[1], "height": picture.shape[0]}
     except (ValueError, OSError, RuntimeError) as error:
-        result = {"ok": False, "error": " ".join(str(error).split())}
+        result, code = {"ok": False, "error": " ".join(str(error).split())}, 2 if isinstance(error, ValueError) else 1
     stdout.write(json.dumps(result) + "\n")
-    return result
+    return code

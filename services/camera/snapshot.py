@@ -18,7 +18,7 @@ from services.camera.picture import Image
 
 def main(argv: Sequence[str], stdout: TextIO) -> int:
     """Take a picture, write it and print the result."""
-    return int("error" in snapshot(argv, stdout, _take))
+    return int(snapshot(argv, stdout, _take) != 0)
 
 
 def _take(words: list[str]) -> tuple[Image, dict[str, Any]]:

@@ -2,7 +2,8 @@
 
 It takes the virtual camera's flags, draws the picture where the vehicle starts (the map's origin when that is not
 written) into a PNG, and prints one JSON object: ``width``, ``height`` and the true ``boxes``, each a ``class``, the
-upper left corner ``x`` and ``y``, ``width`` and ``height`` in pixels. Exit codes: 0 done, 1 not (``error`` says why).
+upper left corner ``x`` and ``y``, ``width`` and ``height`` in pixels. Exit codes: 0 done, 1 not (``error`` says why),
+2 usage.
 """
 
 import sys
@@ -22,7 +23,7 @@ NOW = 0
 
 def main(argv: Sequence[str], stdout: TextIO) -> int:
     """Draw and write the picture; print the truth about it."""
-    return int("error" in snapshot(argv, stdout, _draw))
+    return snapshot(argv, stdout, _draw)
 
 
 def _draw(words: list[str]) -> tuple[Image, dict[str, Any]]:

@@ -6,7 +6,6 @@ A rig's settings become flags of the programs that move it.
 import asyncio
 import contextlib
 import json
-import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -40,42 +39,26 @@ async def query(
     When the caller is cancelled, the program gets SIGTERM, upon which it stops the rig; when the caller is killed, its
     standard input ends, with the same effect. ``descriptors`` are those of leases that the program holds, too.
     """
-    with _sign_of_life() as alive:
-        return await _query(program, words, patience_s, descriptors, alive)
-
-
-@contextlib.contextmanager
-def _sign_of_life() -> Iterator[int]:
-    """The reading end of a pipe that ends with the block, or with this process."""
-    reader, writer = os.pipe()
-    try:
-        yield reader
-    finally:
-        os.close(writer)
-        os.close(reader)
-
-
-async def _query(
-    program: Sequence[str], words: Sequence[str], patience_s: float, descriptors: tuple[int, ...], alive: int
-) -> dict[str, Any]:
     process = await asyncio.create_subprocess_exec(
         *program,
         *words,
-        stdin=alive,
+        stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
         env={**base_environment(), "PYTHONPATH": package_path()},
         start_new_session=True,
         pass_fds=descriptors,
     )
+    assert process.stdout is not None and process.stderr is not None
     try:
         async with asyncio.timeout(patience_s):
-            out, err = await process.communicate()
+            out, err = await asyncio.gather(process.stdout.read(), process.stderr.read())
+            code = await process.wait()
     except TimeoutError:
         raise ProgramTimeout(f"the rig's program gave no answer within {patience_s:g} s") from None
     finally:
         await _end(process)
-    return _answer(out, err, process.returncode)
+    return _answer(out, err, code)
 
 
 def _answer(out: bytes, err: bytes, code: int | None) -> dict[str, Any]:

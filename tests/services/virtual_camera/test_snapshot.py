@@ -50,7 +50,7 @@ def test_what_gives_no_snapshot(
 ) -> None:
     given = (f"--map-path={cube_at([4, 0, 0, 0])}", f"--output={tmp_path / 'snapshot.png'}")
     found, said = snapshot(*given, *words)
-    assert found == 1 and sentence in said["error"]
+    assert found == 2 and sentence in said["error"]
     assert not (tmp_path / "snapshot.png").exists()
 
 
