@@ -36,7 +36,7 @@ class SerialPort:
             raise OSError(f"{target} is not a serial port: {error.args[-1]}") from None
         except serial.SerialException as error:
             if error.errno == errno.EACCES:
-                raise OSError(f"only root and the group '{Path(target).group()}' may open it") from None
+                raise OSError(f"only the group that 'ls -lL {target}' shows may open it") from None
             raise
         _keep(target, self._port)
 
