@@ -84,11 +84,18 @@ async def _end(process: asyncio.subprocess.Process) -> None:
         await process.wait()
 
 
-def _end_with_signals() -> None:
-    task = asyncio.current_task()
+@contextlib.contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """Within the block, a signal that ends this process cancels its task."""
+    loop, task = asyncio.get_running_loop(), asyncio.current_task()
     assert task is not None
     for number in (signal.SIGTERM, signal.SIGHUP):
-        asyncio.get_running_loop().add_signal_handler(number, task.cancel)
+        loop.add_signal_handler(number, task.cancel)
+    try:
+        yield
+    finally:
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            loop.remove_signal_handler(number)
 
 
 @contextlib.contextmanager
@@ -105,8 +112,8 @@ def occupied(
         held.callback(lambda: runner.run(leasing.__aexit__(None, None, None)))
 
         async def asked(command: Command) -> dict[str, Any]:
-            _end_with_signals()
-            return await query(*command, descriptors=descriptors)
+            with _ended_by_signals():
+                return await query(*command, descriptors=descriptors)
 
         def ask(command: Command) -> dict[str, Any]:
             try:
