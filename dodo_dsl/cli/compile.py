@@ -82,7 +82,7 @@ FORMATS: dict[str, Callable[[Sequence[Diagnostic]], str]] = {
 }
 
 EXAMPLES = """examples:
-  dodo compile                             all tests of the deployment, into generated/
+  dodo compile                             all tests of dodo.yml, into generated/
   dodo compile tests/my-test -o out        one folder of tests
   dodo compile --check                     problems of all tests; writes nothing
   dodo compile --check --fix               writes what has exactly one fix, and shows it as a diff

@@ -101,7 +101,7 @@ def _lacks_images(plans: Sequence[Plan]) -> bool:
 
 
 EXAMPLES = """examples:
-  dodo run                                     all tests of the deployment
+  dodo run                                     all tests of dodo.yml
   dodo run sil-closed-straight                 one test
   dodo run 'sil-*' -j 4                        by pattern, four at a time
   dodo run --application ../app/docker-compose.yml --level sil

@@ -77,7 +77,7 @@ PIPELINES = {
     "DODO_PARENT_PIPELINE_ID": "of a child pipeline: the pipeline whose job `dodo-compile` has its tests",
 }
 INPUTS = {
-    "DODO_BUILD", "DODO_COMPOSE_FILE", "DODO_DEPLOYMENT", "DODO_DEPLOYMENT_BRANCH", "DODO_PLATFORMS", "DODO_TESTS",
+    "DODO_BUILD", "DODO_COMPOSE_FILE", "DODO_DOWNSTREAM", "DODO_DOWNSTREAM_BRANCH", "DODO_PLATFORMS", "DODO_TESTS",
     "DODO_TEST_BEFORE_SCRIPT", "DODO_TEST_IMAGE", "DODO_TEST_OPTIONS", "DODO_TEST_SERVICES", "DODO_TEST_TAGS",
 }  # fmt: skip
 """What templates for GitLab hand from an input to a job: set the input."""

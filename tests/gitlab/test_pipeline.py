@@ -99,7 +99,7 @@ def test_without_a_test_there_is_a_job_that_fails(tmp_path: Path) -> None:
     assert (made["dodo-no-tests"]["stage"], made["stages"]) == ("dodo-sil", ["dodo-sil"])
     for deployment, code in (("", 1), ("team/vehicle", 0)):
         script = "set -e\n" + "\n".join(made["dodo-no-tests"]["script"])
-        result = subprocess.run(["sh", "-c", script], env={"DODO_DEPLOYMENT": deployment}, check=False)
+        result = subprocess.run(["sh", "-c", script], env={"DODO_DOWNSTREAM": deployment}, check=False)
         assert result.returncode == code
 
 

@@ -79,7 +79,7 @@ def test_inputs_reach_all_jobs(template: Path) -> None:
     given = {"services": ["docker:dind"], "before_script": "a\nb", "variables": ["DOCKER_HOST"], "tags": []}
     for name, job in jobs(included(template, image="registry/dodo:1", stage="verify", **given)).items():
         assert job["inherit"] == {"default": False, "variables": ["DOCKER_HOST"]}
-        assert (job["stage"], job["interruptible"], "rules" in job) == ("verify", True, name == "dodo-deployment")
+        assert (job["stage"], job["interruptible"], "rules" in job) == ("verify", True, name == "dodo-downstream")
         if "trigger" in job:
             assert job.keys() <= TRIGGERS
         else:
@@ -91,7 +91,7 @@ def test_keywords_of_the_team_s_own_reach_all_jobs() -> None:
     own = {".dodo": {"rules": [{"if": "$NIGHT"}], "allow_failure": True}}
     for name, job in jobs(included(TESTS), own).items():
         assert job["allow_failure"] is True
-        assert (job["rules"] == [{"if": "$NIGHT"}]) is (name != "dodo-deployment")
+        assert (job["rules"] == [{"if": "$NIGHT"}]) is (name != "dodo-downstream")
     night = merged(included(RUN, job_name="night"), {"night": {"parallel": 4}})
     assert jobs(included(RUN), night)["night"]["parallel"] == 4 and "dodo-run" in jobs(included(RUN), night)
 
@@ -137,7 +137,7 @@ def test_a_text_holds_one_input_at_most(template: Path) -> None:
         ("image", ""),
         ("platforms", "linux/amd64 --push"),
         ("platforms", "linux/amd64,"),
-        ("deployment", "group/car\n    branch: x"),
+        ("downstream", "group/car\n    branch: x"),
         ("tags", "sil"),
         ("stage", ""),
         ("images", "yes"),
@@ -269,7 +269,7 @@ def test_images_are_pushed_and_handed_on_by_digest(application: Path, accepted: 
     plugin = application / ".docker/cli-plugins/docker-buildx"
     plugin.parent.mkdir(parents=True)
     plugin.touch()
-    result = compiled(application, {}, images=True, deployment="team/vehicle", platforms="linux/amd64,linux/arm64")
+    result = compiled(application, {}, images=True, downstream="team/vehicle", platforms="linux/amd64,linux/arm64")
     assert result.returncode == 0, result.stderr
     login, context, create, *_, bake, gone = (application / "calls.txt").read_text().splitlines()
     assert login.startswith("login") and (application / "calls.txt.token").read_text() == "secret"
@@ -284,7 +284,7 @@ def test_images_are_pushed_and_handed_on_by_digest(application: Path, accepted: 
     assert (application / "private/docker/cli-plugins/docker-buildx").samefile(plugin)
     images = {f"DODO_IMAGE_{n.replace('-', '_').upper()}": f"{IMAGE}/{n}@{DIGEST}" for n in ("lane-finder", "steering")}
     assert dict(line.split("=", 1) for line in (application / "dodo-images.env").read_text().splitlines()) == images
-    downstream = application / "generated/deployment.gitlab-ci.yml"
+    downstream = application / "generated/downstream.gitlab-ci.yml"
     job = yaml.safe_load(downstream.read_text())["dodo-trigger"]
     assert job["variables"] == images
     assert job["trigger"] == {"project": "team/vehicle", "branch": "main", "strategy": "depend"}
@@ -304,9 +304,9 @@ def test_nothing_is_built_that_is_not_checked(application: Path, build: str) -> 
 @pytest.mark.thorough
 def test_an_application_without_a_build_has_no_images(application: Path) -> None:
     (application / "app/docker-compose.yml").write_text("services: {a: {image: a, command: --cid=111}}\n")
-    result = compiled(application, {}, images=True, deployment="team/vehicle")
+    result = compiled(application, {}, images=True, downstream="team/vehicle")
     assert result.returncode == 0, result.stderr
-    downstream = yaml.safe_load((application / "generated/deployment.gitlab-ci.yml").read_text())
+    downstream = yaml.safe_load((application / "generated/downstream.gitlab-ci.yml").read_text())
     assert "variables" not in downstream["dodo-trigger"]
 
 
