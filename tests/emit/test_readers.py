@@ -1,14 +1,16 @@
 """GitLab, the compose specification and compose itself accept the compiled registry."""
 
 import json
+import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from dodo_dsl.plan.plan_json import from_json
-from tests.emit.readers import check_schema, compose, first_instances
+from tests.emit.readers import ROOT, check_schema, compose, first_instances, tree
 
 pytestmark = pytest.mark.slow
 
@@ -71,3 +73,19 @@ def test_compose_sees_the_test_whatever_is_above_it(generated: Path, name: str) 
         assert_one_project(generated / "sil-closed-straight")
     finally:
         foreign.unlink()
+
+
+@pytest.mark.proof
+def test_an_installed_wheel_gives_the_same_bytes(generated: Path, tmp_path: Path) -> None:
+    wheel, site = tmp_path / "wheel", tmp_path / "site"
+    pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([*pip, "wheel", "--no-deps", "--wheel-dir", str(wheel), str(ROOT)], check=True)
+    subprocess.run([*pip, "install", "--no-deps", "--target", str(site), *map(str, wheel.glob("*.whl"))], check=True)
+    folder = tmp_path / "elsewhere"
+    shutil.copytree(generated.parent, folder, ignore=shutil.ignore_patterns("generated"))
+    environment = {**os.environ, "PYTHONPATH": str(site), "PYTHONHASHSEED": "7"}
+    where = [sys.executable, "-c", "import dodo_dsl; print(dodo_dsl.__file__)"]
+    found = subprocess.run(where, cwd=folder, env=environment, capture_output=True, text=True, check=True).stdout
+    assert found.startswith(str(site))
+    subprocess.run([sys.executable, "-m", "dodo_dsl", "compile"], cwd=folder, env=environment, check=True)
+    assert tree(folder / "generated") == tree(generated)

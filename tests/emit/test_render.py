@@ -63,14 +63,15 @@ def _plan(text: str) -> str:
 
 
 def _summary(files: Mapping[str, str]) -> dict[str, object]:
-    """What a compiled test has of its own: what the plan decided, and image and command of each service."""
+    """What a compiled test has of its own: what the plan decided, and image and command of DoDo's services."""
     plan = json.loads(files["test.json"])
     summary: dict[str, object] = {
         "decided": " ".join(f"{key}={json.dumps(plan[key])}" for key in _DECIDED if plan[key] not in ("", None, []))
     }
     for name, text in files.items():
-        if name.endswith(".compose.yml"):
+        if name.endswith(".compose.yml") and not name.startswith("application"):
             services = yaml.safe_load(text)["services"]
+            services.pop("sandbox", None)
             words = {key: [service.get("image", ""), service.get("command", "")] for key, service in services.items()}
             summary[name.partition(".")[0]] = {
                 key: f"{image} {command if isinstance(command, str) else ' '.join(command)}"
