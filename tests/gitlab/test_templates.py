@@ -33,7 +33,7 @@ echo "$@" >> "$calls"
 case "$*" in
 login*) cat > "$calls.token" ;;
 *"buildx create"*) echo "$4" ;;
-*--push*) env > "$calls.environment"; cp "$4" "$calls.builds"
+*--push*) env > "$calls.environment"; cp "$4" "$calls.builds"; ls "$DOCKER_CONFIG/cli-plugins" > "$calls.plugins"
           while [ "$1" != --metadata-file ]; do shift; done
           echo '{
     json.dumps(
@@ -199,14 +199,13 @@ def compiled(folder: Path, variables: dict[str, str], **inputs: Any) -> "subproc
         **own,
         "PATH": f"{folder / 'bin'}:{os.environ['PATH']}",
         "HOME": str(folder),
-        "DOCKER_CONFIG": str(folder / "private/docker"),
         "PYTHONPATH": str(package_data.root()),
         "CI_JOB_TOKEN": "secret",
         "CI_REGISTRY": "registry.example.org",
         "CI_REGISTRY_IMAGE": IMAGE,
         "CI_COMMIT_SHA": "c0ffee",
         "CI_JOB_ID": "7",
-        "CI_PROJECT_DIR": str(folder),
+        "CI_PROJECT_DIR": str(folder / "project"),
         **variables,
     }
     script = "set -e\n" + "\n".join(job["script"])
@@ -281,7 +280,8 @@ def test_images_are_pushed_and_handed_on_by_digest(application: Path, accepted: 
     assert "secret" not in (application / "calls.txt").read_text() + result.stdout
     environment = (application / "calls.txt.environment").read_text()
     assert "BUILDX_BUILDER=dodo-7\n" in environment and "secret" not in environment, "no build gets the job's own"
-    assert (application / "private/docker/cli-plugins/docker-buildx").samefile(plugin)
+    assert (application / "calls.txt.plugins").read_text() == "docker-buildx\n", "those of the user"
+    assert plugin.exists() and not (application / "project.tmp/docker").exists()
     images = {f"DODO_IMAGE_{n.replace('-', '_').upper()}": f"{IMAGE}/{n}@{DIGEST}" for n in ("lane-finder", "steering")}
     assert dict(line.split("=", 1) for line in (application / "dodo-images.env").read_text().splitlines()) == images
     downstream = application / "generated/downstream.gitlab-ci.yml"
