@@ -66,6 +66,8 @@ def build(
         out / "test",
         functools.cache(lambda setting: replace(plan_application(application, setting), hidden=hidden)),
         addresses.Subnets(deployment.subnets),
+        _import_paths(deployment, out / "test"),
+        _limits(application, deployment),
     )
     builders = [_Builder(test, cid, shared) for test, cid in zip(ordered, cids, strict=True)]
     plans = [builder.plan() for builder in builders]
@@ -113,15 +115,9 @@ class _Shared:
     folder: Path
     rewritten: Callable[[Setting], Application]
     subnets: addresses.Subnets
+    imports: tuple[str, ...]
+    limits: SandboxLimits
     real: Callable[[Path], Path] = field(default_factory=lambda: functools.cache(Path.resolve))
-
-    @functools.cached_property
-    def imports(self) -> tuple[str, ...]:
-        return _import_paths(self.deployment, self.folder)
-
-    @functools.cached_property
-    def limits(self) -> SandboxLimits:
-        return _limits(self.application, self.deployment)
 
 
 class _Builder:

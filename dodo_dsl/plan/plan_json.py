@@ -18,8 +18,6 @@ from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.model import LEVELS
 
 FORMAT = 1
-_RARE = frozenset({"lines", "emulated", "raw_files"})
-"""Keys that are written if there is a value."""
 _PATHS = ("path", "report")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
@@ -29,17 +27,8 @@ class PlanError(ValueError):
 
 
 def to_json(plan: Plan) -> str:
-    application = {**_shallow(plan.application), "services": [*map(_without_nothing, plan.application.services)]}
-    document = {"dodo": "plan", "version": FORMAT, **_without_nothing(plan), "application": application}
-    return json_text(document, orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
-
-
-def _shallow(value: Any) -> dict[str, Any]:
-    return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
-
-
-def _without_nothing(value: Any) -> dict[str, Any]:
-    return {name: each for name, each in _shallow(value).items() if each or name not in _RARE}
+    values = {field.name: getattr(plan, field.name) for field in dataclasses.fields(plan)}
+    return json_text({"dodo": "plan", "version": FORMAT, **values}, orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
 
 
 def json_text(value: Any, option: int = 0) -> str:

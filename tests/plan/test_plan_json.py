@@ -110,9 +110,7 @@ def test_a_missing_or_an_unknown_key(key: str) -> None:
     refused({**document(), f"{key}x": 1})
 
 
-def test_lines_are_written_where_there_are_some() -> None:
-    """So that plans without them are as before."""
+def test_what_is_printed_is_read_again() -> None:
     service = ApplicationService("app", lines=(Line("(?P<x>.)", "a.B", 2),))
     plan = replace(BASE, application=replace(BASE.application, services=(service,)))
     assert from_json(to_json(plan)) == plan
-    assert '"lines"' not in to_json(BASE)
