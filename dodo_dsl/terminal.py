@@ -5,8 +5,8 @@ and the log of CI lines such as ``::error::`` or ``##[error]``.
 """
 
 import json
-import os
 import re
+import shutil
 import unicodedata
 from collections.abc import Iterable
 from typing import Any, TextIO, cast
@@ -31,20 +31,9 @@ def printable(text: str) -> str:
 
 
 def columns(stream: TextIO | None = None) -> int:
-    """How many columns a line may have: COLUMNS, those of the stream's terminal, or of another stream's.
-
-    80 on a terminal of unknown width, ``WIDE`` if there is none, as in the log of CI.
-    """
-    written = os.environ.get("COLUMNS", "")
-    known = int(written) if written.isdecimal() and len(written) <= len(str(_MOST_COLUMNS)) else 0
-    is_terminal = stream is not None and stream.isatty()
-    for descriptor in () if known else _descriptors(stream):
-        try:
-            known = known or os.get_terminal_size(descriptor).columns
-            is_terminal = True
-        except OSError:
-            continue
-    return max(_NARROWEST, min(known or (_USUAL if is_terminal else WIDE), _MOST_COLUMNS))
+    """How many columns a line may have: COLUMNS, those of the terminal that standard output is, or usual ones."""
+    usual = _USUAL if stream is not None and stream.isatty() else WIDE
+    return max(_NARROWEST, min(shutil.get_terminal_size((usual, 0)).columns, _MOST_COLUMNS))
 
 
 def width_of(stream: TextIO) -> int | None:
@@ -57,14 +46,6 @@ def clipped(text: str, width: int | None) -> str:
     if width is None or cells(text) <= width:
         return text
     return text[: _fitting(text, width - 1)].rstrip() + "…"
-
-
-def _descriptors(stream: TextIO | None) -> tuple[int, ...]:
-    """Those that may be the terminal on which the stream is read in the end; none for text in memory."""
-    try:
-        return (*(() if stream is None else (stream.fileno(),)), 1, 2, 0)
-    except (OSError, ValueError):
-        return ()
 
 
 def cells(text: str) -> int:
