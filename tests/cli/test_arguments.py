@@ -8,7 +8,6 @@ SAID = {
     "runn": ("usage: dodo [", "dodo: error: unknown command 'runn'; did you mean 'run'?"),
     "xyzzy": ("usage: dodo [", "dodo: error: unknown command 'xyzzy'; --help shows what there is"),
     "run --leevl sil": ("usage: dodo run ", "dodo run: error: unknown option '--leevl'; did you mean '--level'?"),
-    "run --leevl=sil": ("usage: dodo run ", "dodo run: error: unknown option '--leevl'; did you mean '--level'?"),
     "run --level sli": (
         "usage: dodo run ",
         "dodo run: error: --level: 'sli' is not one of sil, dil, hil; did you mean 'sil'?",

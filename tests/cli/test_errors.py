@@ -2,7 +2,6 @@
 
 from argparse import Namespace
 from io import StringIO
-from pathlib import Path
 from typing import TextIO
 
 import pytest
@@ -103,18 +102,3 @@ def test_files_that_the_user_names_are_the_users(kind: type[OSError]) -> None:
         raise kind(1, "refused", "a.rec")
     with pytest.raises(OSError, match="full"), errors.files_of_the_user():
         raise OSError(28, "full", "a.rec")
-
-
-@pytest.mark.thorough
-def test_commands_that_end_in_errors_name_themselves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    for words, code, said in (
-        (["rec", "info", "none.rec"], 2, "dodo rec: none.rec: No such file or directory\n"),
-        (["report", "none"], 2, "dodo report: there is no none/results.json\n"),
-        (["compile", "none/"], 2, f"dodo compile: there is no test at '{tmp_path / 'none'}'; specs end in .dodo.yml\n"),
-        (["explain", "no-such"], 2, "dodo explain: unknown test or rule 'no-such'"),
-        (["list", "--services", "beakon"], 2, "dodo list: unknown service 'beakon'; did you mean 'beacon'?\n"),
-    ):
-        stderr = StringIO()
-        assert main(words, StringIO(), stderr) == code, words
-        assert stderr.getvalue().startswith(said)

@@ -39,12 +39,9 @@ def test_a_list_loads_nothing_of_plans() -> None:
     assert [name for name in loaded("list", "--services") if name.startswith(parts)] == []
 
 
-@pytest.mark.parametrize("words", [[], ["lst"], ["run", "--jobs"], ["rec", "info"]])
-def test_wrong_words_are_usage_errors(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(words, None, None) == 2  # type: ignore[arg-type]
-    said = capsys.readouterr().err
-    assert "usage: dodo" in said
-    assert ("error: " in said) == bool(words)
+def test_no_words_are_a_usage_error(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([], None, None) == 2  # type: ignore[arg-type]
+    assert capsys.readouterr().err.startswith("usage: dodo")
 
 
 def test_every_argument_is_explained() -> None:

@@ -78,22 +78,6 @@ def marked(variable: str) -> list[str]:
     return found
 
 
-def test_an_error_ends_one_that_nobody_took() -> None:
-    with pytest.raises(ValueError, match="no such test"), loading(options(), 0) as load:
-        server = load.fork_server
-        assert server is not None and server.is_alive
-        raise ValueError("no such test")
-    assert not server.is_alive
-
-
-def test_it_stays_with_who_took_it() -> None:
-    with loading(options(), 0) as load:
-        server = load.take()
-    assert server is not None and server.is_alive
-    server.kill()
-    assert not server.is_alive
-
-
 def test_it_begins_before_anything_large_is_loaded() -> None:
     """As it is to load beside the command."""
     program = "import sys, dodo_dsl.cli.loading; print(*sys.modules)"

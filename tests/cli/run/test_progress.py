@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from dodo_dsl.cli.live_table import LiveProgress
-from dodo_dsl.cli.progress import PlainProgress, about, choose, count
+from dodo_dsl.cli.progress import PlainProgress, about, count
 from dodo_dsl.run.run_state import Standing
 from tests.cli.terminal import SAID, Terminal, shown, wide
 from tests.report.test_report_folder import OUTCOME
@@ -41,12 +41,6 @@ def test_nothing_said_moves_the_cursor(kind: type[LiveProgress] | type[PlainProg
         progress.phase("test", "phase\x1b[2J\r::error::x")
     assert "\x1b[2J" not in terminal.getvalue()
     assert "noted�[2J�::error::x" in shown(terminal.getvalue())
-
-
-def test_a_stream_chooses_its_display(terminal: Terminal) -> None:
-    assert isinstance(choose(terminal, ["test"]), LiveProgress)
-    terminal.isatty = lambda: False  # type: ignore[method-assign]
-    assert isinstance(choose(terminal, ["test"]), PlainProgress)
 
 
 def test_counts_and_forecasts_in_words() -> None:

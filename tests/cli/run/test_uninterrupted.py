@@ -1,6 +1,5 @@
 """What lets a run reach its end: closed pipes and signals."""
 
-import io
 import os
 import resource
 import signal
@@ -23,16 +22,6 @@ def test_a_reader_that_leaves_ends_nothing() -> None:
             stream.writelines(["more\n", "lines\n"])
             stream.flush()
         assert stream.fileno() == pipe.fileno(), "all else is the stream's own"
-
-
-def test_a_stream_without_a_descriptor_may_break_too() -> None:
-    class Broken(io.StringIO):
-        def write(self, text: str) -> int:
-            raise BrokenPipeError
-
-    stream = UninterruptedStream(Broken())
-    assert stream.write("x") == 0
-    stream.flush()
 
 
 def test_signals_wait_until_results_are_written() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.cli import run, watch
-from dodo_dsl.cli.main import main, parser
+from dodo_dsl.cli.main import parser
 from dodo_dsl.cli.watch import Watch, saved, seen
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report import results
@@ -126,13 +126,6 @@ def test_it_looks_at_specs_maps_and_the_application_and_not_at_its_report(desk: 
     found = desk.watch.look()
     assert {desk.spec(BOTH[0]).resolve(), (desk.folder / "kiwi/steering.py").resolve()} <= found.keys()
     assert not [path for path in found if path.is_relative_to(desk.folder / "report")]
-
-
-@pytest.mark.parametrize("word", ["--keep", "--compiled=x"])
-def test_some_options_make_no_sense_with_it(word: str) -> None:
-    stdout, stderr = StringIO(), StringIO()
-    assert main(["run", "--watch", word], stdout, stderr) == 2
-    assert stderr.getvalue() == f"dodo run: --watch and {word.partition('=')[0]} do not go together\n"
 
 
 @pytest.fixture
