@@ -1,46 +1,18 @@
-"""dodo completion: print a script that lets a shell complete commands, options, tests, services and rigs.
-
-A shell asks how a command line may go on as argcomplete's scripts ask: with ``_ARGCOMPLETE``.
-"""
+"""How a command line may go on, where a shell asks with ``_ARGCOMPLETE``: ``register-python-argcomplete dodo``."""
 
 import argparse
 import os
 import shlex
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import argcomplete
 
-from dodo_dsl.cli.errors import Exit
 from dodo_dsl.cli.main import parser
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.registry import SUFFIX, locate
 from dodo_dsl.spec.rig import EMULATED_RIGS
-
-EXAMPLES = """examples:
-  dodo completion bash >> ~/.bashrc
-  dodo completion zsh >> ~/.zshrc
-  dodo completion fish > ~/.config/fish/completions/dodo.fish
-
-A new shell then completes 'dodo', with the program of this name on its PATH. In an open shell, for example bash:
-eval "$(dodo completion bash)".
-"""
-
-SHELLS = ("bash", "zsh", "fish")
-
-
-def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("shell", choices=SHELLS, help="the shell")
-
-
-def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    from argcomplete.shell_integration import shellcode
-
-    if options.shell == "zsh":  # whose own completion may not have been started
-        stdout.write("(( $+functions[compdef] )) || { autoload -Uz compinit && compinit; }\n")
-    stdout.write(shellcode(["dodo"], shell=options.shell) + "\n")
-    return Exit.OK
 
 
 def tests(prefix: str = "", **_: Any) -> list[str]:

@@ -36,9 +36,6 @@ COMMANDS = {
     "rank": Subcommand("rank", "rank applications by the goals of their tests"),
     "rec": Subcommand("rec", "inspect, cut, export and import recordings"),
     "lsp": Subcommand("lsp", "check tests in an editor whenever one is saved"),
-    "completion": Subcommand(
-        "completion", "print a script that lets a shell complete commands, options, tests, services and rigs"
-    ),
     "images": Subcommand("images", "build, push and pull images"),
     "rig": Subcommand("rig", "operate a rig manually: status, motion, calibration, quarantine and camera"),
     "doctor": Subcommand("doctor", "check what this machine can run, what it lacks and what killed runs left behind"),

@@ -3,14 +3,11 @@
 import os
 import subprocess
 import sys
-from io import StringIO
 from pathlib import Path
 
 import pytest
 
 from dodo_dsl.cli import completion
-from dodo_dsl.cli.completion import SHELLS
-from dodo_dsl.cli.main import main
 
 ROOT = Path(__file__).parents[3]
 _ASK = [sys.executable, "-c", "import os, sys; os.dup2(1, 8); from dodo_dsl.__main__ import run; run()"]
@@ -57,19 +54,3 @@ def test_specs_are_completed_as_files() -> None:
     for name in ("a.dodo.yml", "a.txt"):
         Path("mine", name).touch()
     assert completion.tests("mine/") == ["mine/a.dodo.yml"]
-
-
-@pytest.mark.parametrize("shell", SHELLS)
-def test_each_shell_gets_a_script(shell: str) -> None:
-    out = StringIO()
-    assert main(["completion", shell], out, StringIO()) == 0
-    assert "_ARGCOMPLETE" in out.getvalue() and "dodo" in out.getvalue()
-
-
-def test_bash_takes_its_script() -> None:
-    out = StringIO()
-    main(["completion", "bash"], out, StringIO())
-    done = subprocess.run(
-        ["bash", "-c", f"{out.getvalue()}\ncomplete -p dodo"], capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stdout.split()[-1]) == (0, "dodo"), done.stderr
