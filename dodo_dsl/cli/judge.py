@@ -4,7 +4,7 @@ import argparse
 import shutil
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -25,40 +25,25 @@ from dodo_dsl.spec.load import Settings
 from dodo_dsl.terminal import json_text, printable
 
 
-@dataclass(frozen=True)
-class KnownRun:
-    """The run of a recording in a report's folder."""
-
-    outcome: Outcome
-
-    @property
-    def slug(self) -> str:
-        return self.outcome.slug
-
-    @property
-    def cid(self) -> int:
-        return self.outcome.cid
-
-
-def known_run(recording: Path) -> KnownRun | None:
+def known_run(recording: Path) -> Outcome | None:
     """The run whose report holds a recording, from ``results.json`` above its folder; None if there is none."""
     folder = recording.resolve().parent
     try:
         outcomes = results.load(folder.parent / results.FILE_NAME)
     except results.ResultsError:
         return None
-    return next((KnownRun(outcome) for outcome in outcomes if outcome.slug == folder.name), None)
+    return next((outcome for outcome in outcomes if outcome.slug == folder.name), None)
 
 
 VERSION = 1
 
 
-def as_text(plan: Plan, recording: TestRecording, judgement: Judgement, run: KnownRun | None) -> str:
+def as_text(plan: Plan, recording: TestRecording, judgement: Judgement, run: Outcome | None) -> str:
     """The verdict as ``dodo run`` prints it, with all checks, and how it differs from the run's."""
     return "".join(text for text, _ in as_pieces(plan, recording, judgement, run))
 
 
-def as_pieces(plan: Plan, recording: TestRecording, judgement: Judgement, run: KnownRun | None) -> Iterator[Piece]:
+def as_pieces(plan: Plan, recording: TestRecording, judgement: Judgement, run: Outcome | None) -> Iterator[Piece]:
     """The same text in parts, for colours."""
     finding = judgement.finding
     clock = "lockstep" if recording.clock == "lockstep" else "real time"
@@ -75,7 +60,7 @@ def as_pieces(plan: Plan, recording: TestRecording, judgement: Judgement, run: K
     yield "\n".join(lines) + "\n", ""
 
 
-def as_json(plan: Plan, recording: TestRecording, judgement: Judgement, run: KnownRun | None) -> str:
+def as_json(plan: Plan, recording: TestRecording, judgement: Judgement, run: Outcome | None) -> str:
     """The same as one object, its checks as in ``results.json``."""
     finding = judgement.finding
     document: dict[str, Any] = {
@@ -97,19 +82,19 @@ def as_json(plan: Plan, recording: TestRecording, judgement: Judgement, run: Kno
     return json_text(document)
 
 
-def _notes(plan: Plan, judgement: Judgement, run: KnownRun | None) -> list[str]:
+def _notes(plan: Plan, judgement: Judgement, run: Outcome | None) -> list[str]:
     return [*_comparison(plan, judgement, run), *judgement.notes]
 
 
-def _comparison(plan: Plan, judgement: Judgement, run: KnownRun | None) -> Iterator[str]:
+def _comparison(plan: Plan, judgement: Judgement, run: Outcome | None) -> Iterator[str]:
     """Whether the recording is of another test, and whether the run said something else."""
     if run is None:
         return
-    outcome, finding = run.outcome, judgement.finding
+    finding = judgement.finding
     if run.slug != plan.slug:
-        yield f"the recording is of another test, {outcome.name}"
-    elif (outcome.outcome, outcome.reason) != (finding.result, finding.reason):
-        yield f"the run said {outcome.outcome}: {outcome.reason}"
+        yield f"the recording is of another test, {run.name}"
+    elif (run.outcome, run.reason) != (finding.result, finding.reason):
+        yield f"the run said {run.outcome}: {run.reason}"
 
 
 def _checks(verdict: VerdictEvent) -> Iterator[str]:
@@ -206,7 +191,7 @@ def _told(
     plan: Plan,
     recording: TestRecording,
     judgement: Judgement,
-    run: KnownRun | None,
+    run: Outcome | None,
     stdout: TextIO,
 ) -> int:
     if options.json:
@@ -216,7 +201,7 @@ def _told(
     return _EXITS[judgement.finding.result]
 
 
-def _plan(options: argparse.Namespace, run: KnownRun | None, out: Path, notes: TextIO) -> tuple[Plan, Path]:
+def _plan(options: argparse.Namespace, run: Outcome | None, out: Path, notes: TextIO) -> tuple[Plan, Path]:
     """The Plan by which to judge, and the folder of the compiled test; raises UsageError."""
     if options.compiled:
         if options.application:
@@ -228,7 +213,7 @@ def _plan(options: argparse.Namespace, run: KnownRun | None, out: Path, notes: T
     return plan, out / plan.slug
 
 
-def _only(plans: list[Plan], run: KnownRun | None, word: str) -> Plan:
+def _only(plans: list[Plan], run: Outcome | None, word: str) -> Plan:
     """The test itself, or of several the one that the recording is of."""
     same = [plan for plan in plans if len(plans) == 1 or (run is not None and plan.slug == run.slug)]
     if same:

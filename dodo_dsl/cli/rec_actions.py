@@ -126,12 +126,7 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
             rec_export.run(options, stdout, stderr)
             return
         options.file = _only_one(options)
-    path: Path = options.file
-    with progress_bar(stderr, f"reading {path.name}", path.stat().st_size) as progress:
-        recording = Recording(path, progress)
-    with recording:
-        version, messages = messages_for(recording, options.messages, lambda text: tell(stderr, text))
-        job = RecJob(options, recording, messages, stdout, stderr)
+    with opened(options.file, options, stdout, stderr) as (job, version):
         if options.action == "info":
             _info(job, version)
         elif options.action == "cut":
@@ -140,6 +135,16 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
             from dodo_dsl.cli import rec_export
 
             rec_export.EXPORTS[options.format](job)
+
+
+@contextmanager
+def opened(path: Path, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> Iterator[tuple[RecJob, str]]:
+    """A recording with its messages, and the version of their set."""
+    with progress_bar(stderr, f"reading {path.name}", path.stat().st_size) as progress:
+        recording = Recording(path, progress)
+    with recording:
+        version, messages = messages_for(recording, options.messages, lambda text: tell(stderr, text))
+        yield RecJob(options, recording, messages, stdout, stderr), version
 
 
 def _only_one(options: argparse.Namespace) -> Path:

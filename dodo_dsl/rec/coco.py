@@ -10,7 +10,7 @@ import json
 import math
 import zlib
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,10 +23,9 @@ from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.video import DecodedFrame
 from dodo_dsl.rec import truth
-from dodo_dsl.rec.frames import Packet, decoded, write_picture
+from dodo_dsl.rec.frames import PictureSet, write_picture
 
 ANNOTATIONS = "annotations.json"
-PICTURES = "images"
 _PREFIX = "opendlv.logic.perception.Detection"
 _KINDS = ("BoundingBox", "Property", "Type")
 _SLACK = 1e-6
@@ -63,19 +62,13 @@ class DataSet:
 
     images: list[dict[str, Any]] = field(default_factory=list)
     boxes: list[tuple[int, str, list[float]]] = field(default_factory=list)
-    lost: int = 0
     cut: int = 0
     empty: int = 0
     """How many boxes reached over an edge of their frames, and how many had no area in them."""
 
-    @property
-    def classes(self) -> set[str]:
-        """Those of all boxes."""
-        return {name for _, name, _ in self.boxes}
-
-    def text(self, others: Iterable[str] = ()) -> str:
-        """The content of annotations.json, with the classes of ``others``, too; raises LabelError."""
-        numbers = {name: class_number(name) for name in self.classes.union(others)}
+    def text(self, classes: Iterable[str] = ()) -> str:
+        """The content of annotations.json, with further ``classes``; raises LabelError."""
+        numbers = {name: class_number(name) for name in (*classes, *(name for _, name, _ in self.boxes))}
         by_number = {number: name for name, number in numbers.items()}
         if one := next((name for name, number in numbers.items() if by_number[number] != name), ""):
             raise LabelError(f"the classes '{one}' and '{by_number[numbers[one]]}' have the same number: rename one")
@@ -131,49 +124,49 @@ def detections(
 
 
 @dataclass
-class CocoExport:
-    """How frames are written into ``folder``: as ``png`` or ``jpg``, only those with a label or ``everything``.
+class CocoExport(PictureSet):
+    """Frames and annotations.json; only frames with a label or ``everything``."""
 
-    ``progress`` gets the number of packets done, ``problem`` a sentence about what cannot be decoded at all.
-    """
-
-    folder: Path
-    picture_type: str
-    everything: bool
-    progress: Callable[[int], None]
-    problem: Callable[[str], None]
+    everything: bool = False
     result: DataSet = field(default_factory=DataSet)
+    missing = "has a detection with a box in it; --all exports frames without them"
 
-    def add(self, recording: Recording, images: Numbers, labels: Mapping[int, list[Detection]], name: str = "") -> None:
+    def __str__(self) -> str:
+        return f"{len(self.images)} frames with {len(self.result.boxes)} boxes"
+
+    @property
+    def images(self) -> list[dict[str, Any]]:
+        return self.result.images
+
+    @property
+    def classes(self) -> Collection[str]:
+        """Those of all boxes."""
+        return {name for _, name, _ in self.result.boxes}
+
+    def add(
+        self, recording: Recording, images: Numbers, labels: Mapping[int, list[Detection]], name: str,
+        progress: Callable[[int], None],
+    ) -> None:  # fmt: skip
         """Writes the frames of a recording, which has a ``name`` if there are several; raises OSError."""
-        (self.folder / PICTURES).mkdir(parents=True, exist_ok=True)
-        for done, (packet, frame) in enumerate(decoded(recording, images, self.problem), 1):
-            wanted = labels.get(packet.sample_time, ())
-            boxes = [] if frame is None else _boxes(self.result, frame, wanted)
-            if frame is None:
-                self.result.lost += 1
-            elif boxes or self.everything:
-                parts = [*([name] if name else []), packet.sender_stamp, packet.sample_time]
-                path = f"{PICTURES}/{'-'.join(map(str, parts))}.{self.picture_type}"
+        for packet, frame, path in self.frames(recording, images, name, progress):
+            boxes = _boxes(self.result, frame, labels.get(packet.sample_time, ()))
+            if boxes or self.everything:
                 write_picture(self.folder / path, frame)
-                _add(self.result, packet, frame, path, boxes)
-                if name:
-                    self.result.images[-1]["recording"] = str(recording.path)
-            self.progress(done)
+                number, size = len(self.images) + 1, {"width": frame.width, "height": frame.height}
+                image = {"id": number, "file_name": path, **size, "sample_time": packet.sample_time}
+                self.images.append(image | ({"recording": str(recording.path)} if name else {}))
+                self.result.boxes += [(number, label, box) for label, box in boxes]
 
-    def finish(self, classes: Iterable[str] = ()) -> None:
-        """Writes annotations.json, with these ``classes``, too; raises LabelError and OSError."""
+    def notes(self) -> Iterator[str]:
+        yield from super().notes()
+        if self.result.cut:
+            yield f"cut {self.result.cut} boxes at the edges of their frames"
+        if self.result.empty:
+            yield f"left out {self.result.empty} boxes without an area in their frames"
+
+    def finish(self, classes: Collection[str]) -> None:
+        """Writes annotations.json, with these ``classes``; raises LabelError and OSError."""
         (self.folder / ANNOTATIONS).write_text(self.result.text(classes), encoding="utf-8")
-
-    def write(self, recording: Recording, images: Numbers, labels: Mapping[int, list[Detection]]) -> DataSet:
-        """Writes frames and annotations.json; raises LabelError if not one frame is wanted, and OSError."""
-        self.add(recording, images, labels)
-        if not self.result.images and self.result.empty:
-            raise LabelError(f"no detection of {recording.path} has a box with an area in its frame")
-        if not self.result.images:
-            raise LabelError(f"no frame of {recording.path} could be decoded at the sample time of a detection")
-        self.finish()
-        return self.result
 
 
 def _take(detection: Detection, kind: str, message: Any) -> None:
@@ -203,13 +196,6 @@ def _boxes(result: DataSet, frame: DecodedFrame, wanted: Iterable[Detection]) ->
         result.cut += min(x, y) < -_SLACK or max(x + width, y + height) > 1 + _SLACK
         found.append((detection.category, [left, top, round(right - left, 3), round(low - top, 3)]))
     return found
-
-
-def _add(result: DataSet, packet: Packet, frame: DecodedFrame, name: str, boxes: Iterable[LabelledBox]) -> None:
-    number = len(result.images) + 1
-    size = {"width": frame.width, "height": frame.height}
-    result.images.append({"id": number, "file_name": name, **size, "sample_time": packet.sample_time})
-    result.boxes += [(number, label, box) for label, box in boxes]
 
 
 def of_truth(recording: Recording, images: Numbers, path: Path) -> Mapping[int, list[Detection]]:

@@ -1,6 +1,7 @@
 """The camera frames of a recording, decoded."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from dodo_dsl.opendlv.video import DecodedFrame, VideoDecoder, VideoError, refus
 
 MOST_DECODERS = 16
 _JPEG_QUALITY = 95
+PICTURES = "images"
 
 
 class FramesError(ValueError):
@@ -96,6 +98,34 @@ def write_picture(path: Path, frame: DecodedFrame) -> None:
     if not done:
         raise OSError(f"{path.name} cannot be encoded")
     path.write_bytes(data.tobytes())
+
+
+@dataclass
+class PictureSet:
+    """Pictures with labels in ``folder``, as ``png`` or ``jpg``; ``problem`` gets what cannot be decoded at all."""
+
+    folder: Path
+    picture_type: str
+    problem: Callable[[str], None]
+    lost: int = 0
+
+    def frames(
+        self, recording: Recording, images: Numbers, name: str, progress: Callable[[int], None]
+    ) -> Iterator[tuple[Packet, DecodedFrame, str]]:
+        """The frames of a recording with the files for them; those in an earlier recording of the set have others."""
+        (self.folder / PICTURES).mkdir(parents=True, exist_ok=True)
+        for done, (packet, frame) in enumerate(decoded(recording, images, self.problem), 1):
+            if frame is None:
+                self.lost += 1
+            else:
+                file = f"{name}{packet.sender_stamp}-{packet.sample_time}.{self.picture_type}"
+                yield packet, frame, f"{PICTURES}/{file}"
+            progress(done)
+
+    def notes(self) -> Iterator[str]:
+        """Sentences on what is missing."""
+        if self.lost:
+            yield f"{self.lost} packet{'s' * (self.lost > 1)} cannot be decoded"
 
 
 def decoder_of(decoders: dict[tuple[int, str], VideoDecoder], packet: Packet) -> VideoDecoder:

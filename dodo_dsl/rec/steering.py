@@ -7,7 +7,7 @@ set are for training or for validation.
 
 import csv
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,10 +17,9 @@ import numpy as np
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.rec.frames import decoded, write_picture
+from dodo_dsl.rec.frames import PictureSet, write_picture
 
 TABLE = "steering.csv"
-PICTURES = "images"
 COLUMNS = ("picture", "recording", "sample_time_us", "ground_steering_rad", "pedal")
 PATIENCE = 200_000
 """us, two frames at 10 Hz"""
@@ -40,43 +39,58 @@ class RequestedValues:
         return self.values[at] if at < len(self.times) and self.times[at] - time <= PATIENCE else None
 
 
+Answers = Callable[[int], tuple[float, float | None] | None]
+"""The steering and the pedal for a frame of a time, None for a frame without steering."""
+
+
+def answers(recording: Recording, messages: MessageSet, rows: Numbers) -> Answers:
+    """What the messages of ``rows`` answer."""
+    steering = _requests(recording, messages, rows, _STEERING, "groundSteering")
+    pedal = _requests(recording, messages, rows, _PEDAL, "position")
+
+    def answer(time: int) -> tuple[float, float | None] | None:
+        angle = steering.answer(time)
+        return None if angle is None else (angle, pedal.answer(time))
+
+    return answer
+
+
 @dataclass
-class SteeringExport:
-    """Writes into ``folder``, as ``png`` or ``jpg``; ``progress`` and ``problem`` as of the COCO export."""
+class SteeringExport(PictureSet):
+    """Frames and a table."""
 
-    folder: Path
-    picture_type: str
-    progress: Callable[[int], None]
-    problem: Callable[[str], None]
-    rows: list[tuple[Any, ...]] = field(default_factory=list)
-    lost: int = 0
+    images: list[tuple[Any, ...]] = field(default_factory=list)
     unanswered: int = 0
+    classes: Collection[str] = ()
+    missing = "has a GroundSteeringRequest of its sample time or soon after it"
 
-    def add(self, recording: Recording, messages: MessageSet, rows: Numbers, images: Numbers, name: str = "") -> None:
+    def __str__(self) -> str:
+        return f"{len(self.images)} frames with steering"
+
+    def add(
+        self, recording: Recording, images: Numbers, answer: Answers, name: str, progress: Callable[[int], None]
+    ) -> None:
         """Writes the answered frames of a recording; raises OSError."""
-        (self.folder / PICTURES).mkdir(parents=True, exist_ok=True)
-        steering = _requests(recording, messages, rows, _STEERING, "groundSteering")
-        pedal = _requests(recording, messages, rows, _PEDAL, "position")
-        for done, (packet, frame) in enumerate(decoded(recording, images, self.problem), 1):
-            angle = steering.answer(packet.sample_time)
-            if frame is None:
-                self.lost += 1
-            elif angle is None:
+        for packet, frame, path in self.frames(recording, images, name, progress):
+            found = answer(packet.sample_time)
+            if found is None:
                 self.unanswered += 1
-            else:
-                parts = [*([name] if name else []), packet.sender_stamp, packet.sample_time]
-                path = f"{PICTURES}/{'-'.join(map(str, parts))}.{self.picture_type}"
-                write_picture(self.folder / path, frame)
-                pressed = pedal.answer(packet.sample_time)
-                self.rows.append((path, recording.path, packet.sample_time, angle, "" if pressed is None else pressed))
-            self.progress(done)
+                continue
+            write_picture(self.folder / path, frame)
+            angle, pedal = found
+            self.images.append((path, recording.path, packet.sample_time, angle, "" if pedal is None else pedal))
 
-    def finish(self) -> None:
+    def notes(self) -> Iterator[str]:
+        yield from super().notes()
+        if self.unanswered:
+            yield f"left out {self.unanswered} frames without a GroundSteeringRequest within 0.2 s"
+
+    def finish(self, _: Collection[str]) -> None:
         """Writes the table; raises OSError."""
         with (self.folder / TABLE).open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(COLUMNS)
-            writer.writerows(self.rows)
+            writer.writerows(self.images)
 
 
 def _requests(recording: Recording, messages: MessageSet, rows: Numbers, name: str, of: str) -> RequestedValues:

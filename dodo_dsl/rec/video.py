@@ -20,51 +20,8 @@ from dodo_dsl.rec.frames import FramesError, decoded, packets, write_picture
 
 MOST_GAP = 1_800_000_000
 """us between two frames; an MP4 counts the time of a frame in 32 bits."""
-DEFAULT_LASTING = 100_000
-"""us that a single frame is shown."""
-
-
-@dataclass
-class VideoTimes:
-    """When frames are shown, in us since the first, which was taken at ``begin``.
-
-    Each is at least 1 us and at most MOST_GAP after the one before; ``late`` of them are so, and ``gaps`` shortened.
-    """
-
-    begin: int = 0
-    late: int = 0
-    gaps: int = 0
-    _last: int | None = None
-    _shown: int = 0
-
-    def shown(self, time: int) -> int:
-        """When the next frame is shown, which was taken at ``time``."""
-        if self._last is None:
-            self.begin = self._last = time
-        else:
-            rising = max(time, self._last + 1)
-            self.late += rising != time
-            self.gaps += rising - self._last > MOST_GAP
-            self._shown += min(rising - self._last, MOST_GAP)
-            self._last = rising
-        return self._shown
-
-
-def timed(
-    found: Iterator[tuple[int, bytes]], taken: Numbers, times: VideoTimes
-) -> Iterator[tuple[int, bytes, int, int]]:
-    """A packet's number, the packet, when it is shown and for how long, in us; the last as long as the one before."""
-    waiting, lasting = None, DEFAULT_LASTING
-    for number, data in found:
-        shown = times.shown(int(taken[number]))
-        if waiting is not None:
-            lasting = shown - waiting[2]
-            yield *waiting, lasting
-        waiting = number, data, shown
-    if waiting is not None:
-        yield *waiting, lasting
-
-
+_LASTING = 100_000
+"""us that the last frame is shown."""
 _MICROSECOND = Fraction(1, 1_000_000)
 _SHOWN = 40
 _CHOOSE = ", and both do not fit into one video; choose a part with --start and --end"
@@ -72,14 +29,13 @@ _CHOOSE = ", and both do not fit into one video; choose a part with --start and 
 
 @dataclass(frozen=True)
 class VideoFile:
-    """What became of the packets: ``frames`` of ``size`` in the file, ``late`` of them later than they were taken,
-    ``gaps`` shortened, and whether they were ``encoded`` again.
+    """What became of the packets: ``frames`` of ``size`` in the file, ``moved`` of them shown at another time than
+    they were taken, and whether they were ``encoded`` again.
     """
 
     frames: int
     size: tuple[int, int]
-    late: int
-    gaps: int
+    moved: int
     encoded: bool
 
 
@@ -92,22 +48,49 @@ def write_video(
 ) -> VideoFile:
     """Write the image messages of one camera, from the first key frame on, with their sample times.
 
-    ``progress`` gets the number of packets done, ``problem`` a sentence about what cannot be decoded at all. Raises
-    FramesError if nothing can be written, or frames do not fit into one file, and OSError.
+    Each is shown at least 1 us and at most MOST_GAP after the one before. ``progress`` gets the number of packets done,
+    ``problem`` a sentence about what cannot be decoded at all. Raises FramesError if nothing can be written, or frames
+    do not fit into one file, and OSError.
     """
+    import av
+
     format_ = next((packet.format for packet in packets(recording, images) if packet.format), "")
     is_h264 = CODECS.get(format_) == FORMAT
     found = _recorded(recording, images) if is_h264 else _encoded(recording, images, problem)
-    times, mp4, frames = VideoTimes(), None, 0
+    frames = moved = shown = last = 0
     with _readable_errors(recording.path), ExitStack() as files:
-        for number, data, shown, lasting in timed(found, recording.index["time"][images], times):
-            mp4 = mp4 or _Mp4(files, place, data, times.begin)
-            mp4.add(data, shown, lasting)
+        for number, data in found:
+            time = int(recording.index["time"][images[number]])
+            if not frames:
+                stream, size = _stream(files, place, data, time)
+            else:
+                step = min(max(time - last, 1), MOST_GAP)
+                moved += step != time - last
+                shown += step
+            last = max(time, last + 1) if frames else time
+            packet: Any = av.Packet(data)
+            packet.stream, packet.time_base, packet.pts, packet.dts = stream, _MICROSECOND, shown, shown
+            packet.duration, packet.is_keyframe = _LASTING, has_key_frame(data)
+            stream.container.mux(packet)
             frames += 1
             progress(number + 1)
-    if mp4 is None:
+    if not frames:
         raise FramesError(f"no frame of {recording.path} can be decoded")
-    return VideoFile(frames, mp4.size, times.late, times.gaps, not is_h264)
+    return VideoFile(frames, size, moved, not is_h264)
+
+
+def _stream(files: ExitStack, path: Path, first: bytes, begin: int) -> tuple[Any, tuple[int, int]]:
+    """The stream of a new MP4 for H.264 as in the ``first`` packet, taken ``begin`` us after 1970, and its size."""
+    import av
+
+    template = files.enter_context(av.open(io.BytesIO(first), format=FORMAT)).streams.video[0]
+    refuse_large(template.width, template.height)
+    options = {"movflags": "+faststart"}
+    container: Any = files.enter_context(av.open(str(path), "w", format="mp4", options=options))
+    container.metadata["creation_time"] = datetime.fromtimestamp(begin / 1e6, UTC).isoformat()
+    stream: Any = container.add_stream_from_template(template)
+    stream.time_base = _MICROSECOND
+    return stream, (template.width, template.height)
 
 
 @contextmanager
@@ -149,33 +132,6 @@ def _encoded(recording: Recording, images: Numbers, problem: Callable[[str], Non
             sizes = f"a frame of {frame.width} x {frame.height} pixels follows such of {size[0]} x {size[1]}"
             raise VideoError(f"{sizes}{_CHOOSE}")
         yield number, encoder.encode(frame.pixels("bgr"))
-
-
-class _Mp4:
-    """An MP4 of H.264 packets; ``first`` is the first one and ``begin`` its time in us since the epoch."""
-
-    def __init__(self, files: ExitStack, path: Path, first: bytes, begin: int) -> None:
-        import av
-
-        self._packet = av.Packet
-        source = files.enter_context(av.open(io.BytesIO(first), format=FORMAT))
-        template = source.streams.video[0]
-        self.size = template.width, template.height
-        refuse_large(*self.size)
-        options = {"movflags": "+faststart"}
-        container: Any = files.enter_context(av.open(str(path), "w", format="mp4", options=options))
-        container.metadata["creation_time"] = datetime.fromtimestamp(begin / 1e6, UTC).isoformat()
-        self._stream: Any = container.add_stream_from_template(template)
-        self._stream.time_base = _MICROSECOND
-        self._mux = container.mux
-
-    def add(self, data: bytes, time: int, lasting: int) -> None:
-        """A packet that is shown at ``time`` for a while, both in us."""
-        packet: Any = self._packet(data)
-        packet.stream, packet.time_base = self._stream, _MICROSECOND
-        packet.pts = packet.dts = time
-        packet.duration, packet.is_keyframe = lasting, has_key_frame(data)
-        self._mux(packet)
 
 
 def frame_names(recording: Recording, images: Numbers, picture_type: str) -> list[str]:

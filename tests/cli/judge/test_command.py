@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.cli.judge import KnownRun, as_text
+from dodo_dsl.cli.judge import as_text
 from dodo_dsl.cli.main import main
 from dodo_dsl.outcome import Outcome, with_margin
 from dodo_dsl.plan.model import Application, Plan
@@ -76,7 +76,7 @@ def test_the_text_has_checks_evidence_and_what_the_run_said() -> None:
     judgement = Judgement(Finding("failed", "too late", "track"), (verdict,))
     outcome = Outcome("drive", "drive", "", "sil", "closed-loop", "passed", "in time", 111, 0, "lockstep", "process")
     recording = TestRecording(Path("a.rec"), "lockstep", 5.0)
-    assert as_text(PLAN, recording, judgement, KnownRun(outcome)) == (
+    assert as_text(PLAN, recording, judgement, outcome) == (
         "a.rec: 5.0 s in lockstep\n"
         "FAILED  drive  too late\n"
         "        note: the run said passed: in time\n"
