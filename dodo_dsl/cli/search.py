@@ -13,7 +13,6 @@ from dodo_dsl.cli.numbers import minutes, positive, seed
 from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.search_session import INTERRUPTED, SearchSession, session
 from dodo_dsl.cli.uninterrupted import undisturbed
-from dodo_dsl.search.drives import DriveLimits
 from dodo_dsl.search.findings import Findings, document, failures_of, lines
 from dodo_dsl.search.search_loop import SearchLoop
 from dodo_dsl.search.shrinking import Shrinker
@@ -116,15 +115,15 @@ def _search(own: SearchSession, study: Study, store: Store, report: Path) -> tup
     """What was found, and whether an interrupt ended it."""
     options, deadline = own.options, _deadline(own.options)
     runs = min(options.runs or (_MOST_BY_TIME if options.minutes else _RUNS), _MOST_RUNS)
-    limits = DriveLimits(deadline, a_core=1) if deadline or options.storage else DriveLimits()
     total = runs + 1 if options.runs or not deadline else None
-    with own.drives(study, store, report / "drives", limits, total) as drives:
+    with own.drives(study, store, report / "drives", deadline, total) as drives:
+        drives.a_core = 1 if options.storage else drives.a_core
         loop = SearchLoop(
             study.test.spec, study.space, runs, options.seed, drives, not options.sweep, options.until_failure
         )
         shrinker = Shrinker(study, drives, report, runs + 1, _registry(study) if options.save else None)
-        end = drives.run(_follow(loop, shrinker))
-    return replace(loop.findings(), shrunk=tuple(shrinker.found)), end is not None
+        interrupted = drives.run(_follow(loop, shrinker))
+    return replace(loop.findings(), shrunk=tuple(shrinker.found)), interrupted
 
 
 def _deadline(options: argparse.Namespace) -> float | None:

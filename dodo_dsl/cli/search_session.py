@@ -19,11 +19,10 @@ from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors
 from dodo_dsl.diagnostics import has_errors, ordered, told_once
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.run.backends import CombinedBackends
-from dodo_dsl.run.rigs.session import RigSession
 from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
-from dodo_dsl.search.drives import DriveHost, DriveLimits, Drives, KeptBackends, end_like_interrupt
+from dodo_dsl.search.drives import Drives, KeptBackends, end_like_interrupt
 from dodo_dsl.search.store import Drive, Store
 from dodo_dsl.search.study import Study
 from dodo_dsl.spec.load import Settings
@@ -59,22 +58,21 @@ class SearchSession:
 
     @contextmanager
     def drives(
-        self, study: Study, store: Store, folder: Path, limits: DriveLimits, total: int | None
+        self, study: Study, store: Store, folder: Path, deadline: float | None, total: int | None
     ) -> Iterator[Drives]:
         """Drives by processes, with progress of ``total`` of them, None if time ends them."""
-        progress = SearchProgress(self.stdout, total, limits.deadline)
-        try:
-            yield Drives(study.checked, store, self._machine(study), progress, folder, limits)
-        finally:
-            progress.close()
-
-    def _machine(self, study: Study) -> DriveHost:
-        deployment, options, rigs = study.checked.deployment, self.options, RigSession()
+        deployment, options = study.checked.deployment, self.options
         backends = CombinedBackends(
             options.backend, deployment.cids, isolation=options.isolation, descriptors=(self.load.descriptor,),
-            loaded=self.load.take, session=rigs,
+            loaded=self.load.take,
         )  # fmt: skip
-        return DriveHost(KeptBackends(backends), schedule(options.jobs, expectation(backends.name)), self.work, rigs)
+        order = schedule(options.jobs, expectation(backends.name))
+        progress = SearchProgress(self.stdout, total, deadline)
+        try:
+            kept = KeptBackends(backends)
+            yield Drives(study.checked, store, kept, order, self.work, progress, folder, deadline, 1 if deadline else 8)
+        finally:
+            progress.close()
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 """dodo tune: find values of the application's parameters that increase the test margin."""
 
 import argparse
-import math
 import time
 from pathlib import Path
 from typing import TextIO
@@ -13,28 +12,25 @@ from dodo_dsl.cli.numbers import minutes, positive, seed
 from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.search_session import INTERRUPTED, SearchSession, session
 from dodo_dsl.cli.uninterrupted import undisturbed
-from dodo_dsl.search.drives import DriveLimits, RigFailure
 from dodo_dsl.search.store import Store, opened
 from dodo_dsl.search.study import Study, tune_study
-from dodo_dsl.search.tuning import Scenarios, Tuning, document, env, scenarios, table
-from dodo_dsl.terminal import json_text, printable
+from dodo_dsl.search.tuning import Tuning, document, env, scenarios, table
+from dodo_dsl.terminal import json_text
 
 EXAMPLES = """examples:
   dodo tune sil-my-drive                        50 choices of the application's parameters
   dodo tune 'sil-*' --mean --minutes 30         the best mean over several tests, in half an hour
   dodo tune sil-my-drive --samples 8            also at 8 samples of the test's ranges, 'vary'
-  dodo tune hil-my-drive --minutes 20 --metres 50    on its rig, which drives 50 m at most
 
 The same command continues where an earlier one was interrupted, or adds runs.
 
-exit codes: 0 the best values pass, 1 they fail, 2 wrong usage or spec, 3 not even the defaults were driven, or a rig
-failed, 130 interrupted
+exit codes: 0 the best values pass, 1 they fail, 2 wrong usage or spec, 3 not even the defaults were driven, 130
+interrupted
 """
 
 FOLDER, STORE, RESULT, VALUES = "tune", "tune.journal", "tune.json", "best.env"
 _RUNS = 50
 _MOST_RUNS = 1 << 14
-_RIG_MINUTES, _RIG_METRES = 30.0, 100.0
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -44,12 +40,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help=f"choices of values, each driven in all tests and samples (default: {_RUNS}, unless --minutes is given)",
     )  # fmt: skip
     parser.add_argument(
-        "--minutes", type=minutes, metavar="M",
-        help=f"tune no longer than that; held-out samples follow (default on a rig: {_RIG_MINUTES:g})",
-    )  # fmt: skip
-    parser.add_argument(
-        "--metres", type=positive, metavar="M",
-        help=f"longest distance that a rig drives, counting 2.4 m to each start (default: {_RIG_METRES:g})",
+        "--minutes", type=minutes, metavar="M", help="tune no longer than that; held-out samples follow"
     )  # fmt: skip
     parser.add_argument("--mean", action="store_true", help="optimise the mean margin, not the worst one")
     parser.add_argument(
@@ -75,15 +66,12 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         checked = own.selected(options.tests)
         study = tune_study(checked, own.compiled(checked), own.work, options.samples)
         with opened(str(report / STORE), FOLDER, study.key) as store:
-            tuning, end = _tune(own, study, store, report)
+            tuning, interrupted = _tune(own, study, store, report)
             if tuning.done:
                 _write(tuning, report, own.stdout)
     if tuning.done:
         own.stdout.write(f"values: {options.report / FOLDER / VALUES}\n")
-    if isinstance(end, RigFailure):
-        own.stdout.write(printable(f"the rig failed: {end}; the same command goes on from here") + "\n")
-        return Exit.ERROR
-    if end is not None:
+    if interrupted:
         own.stdout.write(INTERRUPTED)
         return Exit.INTERRUPTED
     if not tuning.done:
@@ -91,27 +79,16 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     return Exit.PROBLEMS if tuning.best.margin < 0 else Exit.OK
 
 
-def _tune(own: SearchSession, study: Study, store: Store, report: Path) -> tuple[Tuning, BaseException | None]:
-    """The tuning, and what ended it early: an interrupt, or a rig."""
+def _tune(own: SearchSession, study: Study, store: Store, report: Path) -> tuple[Tuning, bool]:
+    """The tuning, and whether an interrupt ended it early."""
     options = own.options
     runs = min(options.runs or (_MOST_RUNS if options.minutes else _RUNS), _MOST_RUNS)
     driven = scenarios(study.checked.tests, options.samples, options.seed)
-    limits = _limits(own, driven)
-    total = driven.most_drives(runs) if options.runs or not limits.deadline else None
-    with own.drives(study, store, report / "drives", limits, total) as drives:
+    deadline = time.monotonic() + options.minutes * 60 if options.minutes else None
+    total = driven.most_drives(runs) if options.runs or not deadline else None
+    with own.drives(study, store, report / "drives", deadline, total) as drives:
         tuning = Tuning(study.space, driven, runs, options.seed, drives, options.mean)
         return tuning, drives.run(tuning.follow())
-
-
-def _limits(own: SearchSession, driven: Scenarios) -> DriveLimits:
-    options = own.options
-    if driven.rigs:
-        options.minutes = options.minutes or _RIG_MINUTES
-        options.metres = options.metres or _RIG_METRES
-        said = f"on rig {', '.join(driven.rigs)}: at most {options.minutes:g} min, and {options.metres:g} m of driving"
-        own.stdout.write(printable(said) + "\n")
-    deadline = time.monotonic() + options.minutes * 60 if options.minutes else None
-    return DriveLimits(deadline, options.metres or math.inf, 1 if deadline else 8)
 
 
 def _write(tuning: Tuning, report: Path, stdout: TextIO) -> None:

@@ -16,7 +16,7 @@ from dodo_dsl.run.process.processes import Processes
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.run.rigs.ports import refuse_unattended
-from dodo_dsl.run.rigs.session import RigSession, attended
+from dodo_dsl.run.rigs.session import attended
 from dodo_dsl.run.sides import Backend, Side, WatchedServices
 from dodo_dsl.run.work_folder import meeting_place
 
@@ -75,8 +75,8 @@ class CombinedBackends:
     """The backends of a combination, by its ``name``.
 
     On the host, processes take one of the ``cids``; ``subnets`` are for networks of containers. ``isolation`` is in
-    place of the tests' own. A ``session`` spares rigs that stay fit their checks between tests. ``loaded`` gives a fork
-    server that was started with the same ``descriptors`` while tests were compiled.
+    place of the tests' own. ``loaded`` gives a fork server that was started with the same ``descriptors`` while tests
+    were compiled.
     """
 
     name: str
@@ -85,7 +85,6 @@ class CombinedBackends:
     isolation: str | None = None
     descriptors: tuple[int, ...] = ()
     loaded: Callable[[], ForkServer | None] = lambda: None
-    session: RigSession | None = None
     _kinds: "list[Processes | Containers]" = field(default_factory=list)
     _alone: asyncio.Lock = field(default_factory=asyncio.Lock)
     """A queue without time limit for tests of this run that need the machine for themselves."""
@@ -110,7 +109,7 @@ class CombinedBackends:
 
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
-        plan = self.session.at_home(job.plan) if self.session else job.plan
+        plan = job.plan
         isolation = "host" if plan.is_real else self.isolation or plan.isolation
         refuse_unattended(plan)
         for kind in self._kinds:
@@ -138,6 +137,6 @@ class CombinedBackends:
         async with (
             self._alone if alone else contextlib.nullcontext(),
             host_isolation.host_slot(plan, cids, say, keep, alone=alone) as leased,
-            attended(plan, replace(leased, channel=channel), say, self.session) as descriptors,
+            attended(plan, replace(leased, channel=channel), say) as descriptors,
         ):
             yield replace(leased, descriptors=(*descriptors, *self.descriptors), channel=channel)

@@ -2,12 +2,10 @@
 
 import asyncio
 import itertools
-import math
 import shutil
 import signal
 import time
-from collections.abc import Collection, Coroutine, Mapping, Sequence
-from contextlib import AbstractAsyncContextManager
+from collections.abc import Awaitable, Callable, Collection, Coroutine, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -20,10 +18,8 @@ from dodo_dsl.outcome import Outcome, failed_checks, worst_margin
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.protocol import Say
-from dodo_dsl.run.rigs.session import RigSession
 from dodo_dsl.run.runner import Policy, Progress, Runner
 from dodo_dsl.run.schedule import Schedule
-from dodo_dsl.run.sides import Backend
 from dodo_dsl.search.space import texts
 from dodo_dsl.search.store import Drive, Store, point_text
 from dodo_dsl.search.study import NotSearchable
@@ -35,16 +31,10 @@ _REPEAT = "#"
 """No name of a range."""
 _RETRIES = 1
 """A drive that ended in error is driven once more, and left out when it does so again."""
-_DISTANCE, _FASTEST, _TO_START = ("distance", "m"), 1.0, 2.4
-"""The check of how far a vehicle drove, the highest speed of a rig, in m/s, and the way across its table, in m."""
 
 
 class Interrupted(Exception):
     """Ctrl-C or a signal ended the drives; everything until then is kept."""
-
-
-class RigFailure(Exception):
-    """A test on a rig ended in error, which shows nothing about the values; one sentence."""
 
 
 class DriveProgress(Progress, Protocol):
@@ -58,26 +48,16 @@ class KeptBackends:
     """Backends for several rounds: prepared before the first one, and closed by ``end``."""
 
     def __init__(self, backends: Backends) -> None:
-        self._backends = backends
-        self.name = backends.name
-        self._is_prepared = False
-        self.opened = 0
-        """How many attempts at tests began."""
+        self.name, self.open, self.end = backends.name, backends.open, backends.close
+        self._prepare: Callable[[Sequence[Plan], Say], Awaitable[None]] | None = backends.prepare
 
     async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
-        if not self._is_prepared:
-            self._is_prepared = True
-            await self._backends.prepare(plans, note)
+        prepare, self._prepare = self._prepare, None
+        if prepare:
+            await prepare(plans, note)
 
     def close(self) -> None:
         """The next round needs them."""
-
-    def end(self) -> None:
-        self._backends.close()
-
-    def open(self, job: Job, say: Say, keep: bool) -> AbstractAsyncContextManager[Backend]:
-        self.opened += 1
-        return self._backends.open(job, say, keep)
 
 
 def end_like_interrupt() -> None:
@@ -111,61 +91,41 @@ def drive_name(values: Values, repeat: int = 1) -> dict[str, str]:
 
 
 @dataclass
-class DriveHost:
-    """Where drives run: ``work`` takes compiled tests, and ``session`` spares rigs that stay fit their checks."""
-
-    backends: KeptBackends
-    order: Schedule
-    work: Path
-    session: RigSession = field(default_factory=RigSession)
-
-
-@dataclass
-class DriveLimits:
-    """No drive begins after ``deadline`` of the monotonic clock, or when rigs drove ``metres`` of ``way``.
-
-    ``a_core`` are the drives of a round: several, so that cores hardly wait for its last one.
-    """
-
-    deadline: float | None = None
-    metres: float = math.inf
-    a_core: int = 8
-    way: float = 0.0
-
-    @property
-    def are_reached(self) -> bool:
-        return self.way >= self.metres or (self.deadline is not None and time.monotonic() >= self.deadline)
-
-
-@dataclass
 class Drives:
-    """Drives points, on rigs one after the other. ``folder`` takes what drives that did not pass say."""
+    """Drives points in rounds of ``a_core`` drives a core; none begins after ``deadline`` of the monotonic clock.
+
+    ``work`` takes compiled tests, and ``folder`` what drives that did not pass say. ``known`` are all drives so far.
+    """
 
     checked: compiler.Checked
     store: Store
-    machine: DriveHost
+    backends: KeptBackends
+    order: Schedule
+    work: Path
     progress: DriveProgress
     folder: Path
-    limits: DriveLimits
+    deadline: float | None = None
+    a_core: int = 8
     known: dict[str, Drive] = field(default_factory=dict)
 
-    def run(self, work: Coroutine[Any, Any, None]) -> BaseException | None:
-        """Does work that drives, and closes the backends. What ended it early, an interrupt or a rig; else None."""
-        return asyncio.run(self._ended_by(work))
+    @property
+    def is_over(self) -> bool:
+        return self.deadline is not None and time.monotonic() >= self.deadline
 
-    async def _ended_by(self, work: Coroutine[Any, Any, None]) -> BaseException | None:
+    def run(self, work: Coroutine[Any, Any, None]) -> bool:
+        """Does work that drives, and closes the backends. Whether an interrupt ended it early."""
         try:
-            await work
-        except (Interrupted, KeyboardInterrupt, RigFailure) as end:
-            return end
+            asyncio.run(work)
+        except (Interrupted, KeyboardInterrupt):
+            return True
         finally:
-            self.machine.backends.end()
-        return None
+            self.backends.end()
+        return False
 
     async def drive(self, points: Sequence[SearchPoint], first: int | None = None) -> None:
         """Drives the points, as far as the limits allow; those with the same name share a drive.
 
-        They are numbered from ``first`` on, else as the store does. Raises Interrupted and RigFailure.
+        They are numbered from ``first`` on, else as the store does. Raises Interrupted.
         """
         missing: dict[str, tuple[int, SearchPoint]] = {}
         for number, point in enumerate(points, first or 0):
@@ -175,7 +135,7 @@ class Drives:
             drives = self.store.known([point.name for _, point in missing.values()])
             self.known |= {name: drive for name, drive in zip(missing, drives, strict=True) if drive}
             missing = {name: one for name, one in missing.items() if name not in self.known}
-            if not missing or self.limits.are_reached:
+            if not missing or self.is_over:
                 return
             claims = ((*one, self.store.claim(one[1].name)) for one in missing.values())
             free = ((n if first is not None else claim, point) for n, point, claim in claims if claim is not None)
@@ -187,43 +147,30 @@ class Drives:
 
     def _size(self, points: Sequence[SearchPoint]) -> int:
         """How many drives a round has."""
-        if any(point.spec.rig for point in points):
-            return 1
-        size = max(1, int(self.machine.order.capacity)) * self.limits.a_core
+        size = max(1, int(self.order.capacity)) * self.a_core
         on_host = any(point.spec.isolation == "host" for point in points)
         return min(size, len(self.checked.deployment.cids)) if on_host else size
 
     async def _round(self, points: dict[int, SearchPoint]) -> None:
-        folder = self.machine.work / f"round-{min(points)}"
+        folder = self.work / f"round-{min(points)}"
         jobs = self._jobs(points, folder)
         for job in jobs.values():
             shutil.rmtree(job.report, ignore_errors=True)  # what a killed command left of the same drive
         by_slug = {job.plan.slug: number for number, job in jobs.items()}
-        runner = Runner(self.progress, self.machine.backends, self.machine.order, Policy(retries=_RETRIES))
-        failures: list[str] = []
-        before = self.machine.backends.opened
+        runner = Runner(self.progress, self.backends, self.order, Policy(retries=_RETRIES))
 
         def take(job: Job, outcome: Outcome) -> None:
-            if runner.interrupted:
-                return
-            if job.plan.rig:
-                self.limits.way += (self.machine.backends.opened - before) * _way(outcome)
-                if outcome.outcome == "error":
-                    failures.append(outcome.reason)
-                    return
-                self.machine.session.fit.add(job.plan.rig)
-            number = by_slug[outcome.slug]
-            self._keep(number, points[number], outcome)
-            if outcome.outcome == "passed":
-                shutil.rmtree(job.report, ignore_errors=True)
+            if not runner.interrupted:
+                number = by_slug[outcome.slug]
+                self._keep(number, points[number], outcome)
+                if outcome.outcome == "passed":
+                    shutil.rmtree(job.report, ignore_errors=True)
 
         await runner.run(list(jobs.values()), take)
         end_like_interrupt()
         shutil.rmtree(folder, ignore_errors=True)
         if runner.interrupted:
             raise Interrupted
-        if failures:
-            raise RigFailure(failures[0])
 
     def _keep(self, number: int, point: SearchPoint, outcome: Outcome) -> None:
         checks = ",".join(failed_checks(outcome))
@@ -249,10 +196,3 @@ class Drives:
         (test,) = compiler.at_values(self.checked, point.spec, {str(number): point.values}).tests
         given = {name: Entry(value.span, value) for name, value in point.variables.items()}
         return replace(test, spec=replace(test.spec, variables=test.spec.variables | given)) if given else test
-
-
-def _way(outcome: Outcome) -> float:
-    """What a rig drove at most in a test and to its start, in m; by the time if no check says it."""
-    said = [check["value"] for check in outcome.checks if (check["name"], check["unit"]) == _DISTANCE]
-    driven = [float(value) for value in said if value is not None]
-    return _TO_START + (max(driven) if driven else _FASTEST * (outcome.execution_s or 0.0))

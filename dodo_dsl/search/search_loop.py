@@ -44,7 +44,7 @@ class SearchLoop:
                     await self._repeat_failures(batch, begin + 1)
             finally:
                 self.done += [one for one in batch if self.drives.store.get(drive_name(one.values))]
-            if self.ended_early or self.drives.limits.are_reached:
+            if self.ended_early or self.drives.is_over:
                 return
 
     async def _drive(self, candidates: Sequence[Values], first: int, repeat: int = 1) -> None:

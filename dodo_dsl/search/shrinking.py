@@ -52,7 +52,7 @@ class Shrinker:
 
     async def shrink(self, failures: Sequence[SearchFailure], failed: Sequence[tuple[Values, Drive]]) -> None:
         """Shrinks the first failures of ``failed`` drives, however long it takes. Raises Interrupted."""
-        self.drives.folder, self.drives.limits.deadline = self.report / FOLDER, None
+        self.drives.folder, self.drives.deadline = self.report / FOLDER, None
         for failure in failures[:MOST_KINDS]:
             self.drives.progress.note(f"reducing: {failure.worst.reason} (--sweep leaves it out)")
             await self._shrink([one for one in failed if kind_of(one[1].reason) == failure.kind])

@@ -82,8 +82,8 @@ def _refuse_tuning(space: Space, specs: Sequence[Spec], samples: int) -> None:
     if not space.ranges:
         raise NotSearchable("the application has no parameters to tune: write them under 'x-dodo: {tune: ...}'")
     for spec in specs:
-        if not spec.is_stepped and not spec.rig:
-            raise NotSearchable(f"{spec.title} is in real time and on no rig; tuning needs lockstep or a rig")
+        if not spec.is_stepped:
+            raise NotSearchable(f"{spec.title} is in real time; tuning needs lockstep")
         if both := [one.name for one in space.ranges if one.name in spec.variables]:
             raise NotSearchable(f"{spec.title} sets '{both[0]}' itself, so it cannot be tuned there")
     if samples and not any(spec.ranges for spec in specs):

@@ -53,11 +53,6 @@ class Scenarios:
     guiding: tuple[Scenario, ...]
     held_out: tuple[Scenario, ...] = ()
 
-    @property
-    def rigs(self) -> list[str]:
-        """Names of the rigs that are driven."""
-        return sorted({one.spec.rig for one in self.guiding if one.spec.rig})
-
     def most_drives(self, runs: int) -> int:
         """Defaults and choices in all that guide, and both in those held out."""
         return (runs + 1) * len(self.guiding) + 2 * len(self.held_out)
@@ -102,7 +97,7 @@ class Tuning:
         return max(self.done, key=lambda one: one.margin)
 
     async def follow(self) -> None:
-        """Raises Interrupted and RigFailure."""
+        """Raises Interrupted."""
         margins = await self._judge([nominal(self.space)])
         study, ranges = self._study()
         for begin in range(0, self.runs if margins else 0, _TOGETHER):
@@ -114,7 +109,7 @@ class Tuning:
             for trial, margin in zip(trials, margins, strict=True):
                 study.tell(trial, margin)
         if self.done:
-            self.drives.limits.deadline = None
+            self.drives.deadline = None
             await self._drive([self.done[0].values, self.best.values], self.scenarios.held_out)
 
     def _study(self) -> "tuple[Study, dict[str, BaseDistribution]]":

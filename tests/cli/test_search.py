@@ -17,7 +17,7 @@ from dodo_dsl import advice, compiler
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.main import main
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.search.drives import DriveLimits
+from dodo_dsl.search.drives import Drives
 from tests.check import examples
 from tests.run.scripted import ScriptedBackend
 from tests.search.scripted_drives import LIMIT, SPEC, scripted_commands, stages, start_of
@@ -215,7 +215,7 @@ def test_a_search_goes_on_in_another_folder(search: Search, tmp_path: Path, monk
 
 
 def test_a_search_by_time_begins_no_drive_after_it(search: Search, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(DriveLimits, "are_reached", property(lambda _: len(search.driven) >= 5))
+    monkeypatch.setattr(Drives, "is_over", property(lambda _: len(search.driven) >= 5))
     code, _ = search("example", "--minutes", "60", "-j", "1")
     assert (code in (0, 1), len(search.driven)) == (True, 5)
     assert result()["nominal"]["outcome"] == "passed"

@@ -5,7 +5,6 @@ A rig that fails the check before a test goes into quarantine.
 
 import contextlib
 from collections.abc import AsyncIterator, Callable, Sequence
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +23,8 @@ CHECKS = {"gantry": ("services.gantry.manual", "check"), "camera": ("services.ca
 """By the name of the service: the module that checks its hardware by the service's flags, and its action."""
 
 
-async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int, ...], is_fit: bool = False) -> None:
-    """Checks the real rig of a test, unless it is known to be fit; a rig that fails goes into quarantine.
+async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int, ...]) -> None:
+    """Checks the real rig of a test; one that fails goes into quarantine.
 
     Raises BackendError when the rig is in quarantine, fails, or cannot be checked. ``descriptors`` are those of the
     rig's leases, which the check goes on to hold if this process is killed.
@@ -33,7 +32,7 @@ async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int
     try:
         devices = devices_of(plan)
         reason = quarantined(plan.rig, devices)
-        if not reason and not is_fit:
+        if not reason:
             say(f"checking rig '{plan.rig}'")
             reason = await _failure(plan, descriptors)
             if reason:
@@ -73,40 +72,16 @@ async def _query(program: Sequence[str], words: Sequence[str], descriptors: tupl
     return await query(program, words, PATIENCE_S, descriptors)
 
 
-@dataclass
-class RigSession:
-    """What holds from test to test of one command: ``fit`` rigs passed their check, and their last test was judged.
-
-    The caller adds the rig of a test with its outcome; it is taken out as soon as the next one begins. A fit rig is not
-    checked again, and has found its home.
-    """
-
-    fit: set[str] = field(default_factory=set)
-
-    def at_home(self, plan: Plan) -> Plan:
-        """The Plan without a calibration that is not needed."""
-        if plan.rig not in self.fit:
-            return plan
-        services = (
-            replace(service, flags=tuple(flag for flag in service.flags if flag.name != "calibrate"))
-            if service.uses == "gantry"
-            else service
-            for service in plan.services
-        )
-        return replace(plan, services=tuple(services))
-
-
 @contextlib.asynccontextmanager
 async def attended(
     plan: Plan,
     slot: Slot,
     say: Callable[[str], None],
-    session: RigSession | None = None,
 ) -> AsyncIterator[tuple[int, ...]]:
     """Leases and checks a real rig's devices, and sends a heartbeat within the block; does nothing for other tests.
 
-    Gives all descriptors by which a program holds the rig, with those of the ``slot``. A rig that is fit in the
-    ``session`` is not checked. Raises BackendError when the rig is in use, in quarantine, or fails its check.
+    Gives all descriptors by which a program holds the rig, with those of the ``slot``. Raises BackendError when the rig
+    is in use, in quarantine, or fails its check.
     """
     if not plan.is_real:
         yield slot.descriptors
@@ -114,9 +89,6 @@ async def attended(
     async with contextlib.AsyncExitStack() as stack:
         refuse_shared_port(plan)
         more = await stack.enter_async_context(leased(None, plan.slug, say, devices=devices_of(plan)))
-        is_fit = session is not None and plan.rig in session.fit
-        if session:
-            session.fit.discard(plan.rig)
-        await examine(plan, say, (*slot.descriptors, *more), is_fit)
+        await examine(plan, say, (*slot.descriptors, *more))
         await stack.enter_async_context(heartbeat(slot.cid, Path(slot.channel)))
         yield (*slot.descriptors, *more)
