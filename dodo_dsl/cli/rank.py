@@ -1,7 +1,6 @@
 """dodo rank: rank applications by the goals of their tests.
 
-Scores of teams have intervals from repeated or sampled runs. A ranking is text, Markdown, JSON, or a page: one file,
-without scripts, with a bar for each score and its interval.
+Scores of teams have intervals from repeated or sampled runs.
 """
 
 import argparse
@@ -13,13 +12,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
-from markupsafe import Markup
-
-from dodo_dsl import __version__
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import results
-from dodo_dsl.report.overview import environment, source_hash, style
 from dodo_dsl.spec.model import Goal
 from dodo_dsl.terminal import json_text, printable
 
@@ -203,32 +198,22 @@ def load_teams(words: Sequence[str]) -> dict[str, list[Outcome]]:
     Files with the same written name are one team's; names of folders have to differ.
     """
     teams: dict[str, list[Outcome]] = {}
-    folders: dict[str, str] = {}
+    of_folders: set[str] = set()
     for word in words:
-        name, path = _named(word)
-        if not name:
-            name = path.resolve().parent.name
-            if name in folders or name in teams:
-                raise UsageError(f"two results are of team '{name}'; name them, as in {name}-2={word}")
-            folders[name] = word
-        elif name in folders:
-            raise UsageError(f"two results are of team '{name}', as '{folders[name]}' is in a folder of that name")
+        written, _, file = word.partition("=")
+        if Path(word).exists() or not file:
+            written, file = "", word
+        path = Path(file) / results.FILE_NAME if Path(file).is_dir() else Path(file)
+        name = written or path.resolve().parent.name
+        if name in teams and (not written or name in of_folders):
+            raise UsageError(f"two results are of team '{name}'; name them, as in {name}-2={word}")
+        if not written:
+            of_folders.add(name)
         teams.setdefault(name, []).extend(results.load(path))
     if empty := next((name for name, outcomes in teams.items() if not outcomes), None):
         raise UsageError(f"the results of team '{empty}' have no test")
     _check_goals(teams)
     return teams
-
-
-def _named(word: str) -> tuple[str, Path]:
-    """A team's name, empty if it is not written, and its file."""
-    name, equals, file = word.partition("=")
-    if equals and name and not Path(word).exists():
-        word = file
-    else:
-        name = ""
-    path = Path(word)
-    return name, path / results.FILE_NAME if path.is_dir() else path
 
 
 def _check_goals(teams: dict[str, list[Outcome]]) -> None:
@@ -248,7 +233,6 @@ EXAMPLES = """examples:
   dodo rank old=one/dodo-report new=two/dodo-report
   dodo rank a=1/results.json a=2/results.json b=3/results.json     two runs of team 'a'
   dodo rank */results.json --format markdown
-  dodo rank */results.json --format html > ranking.html
 
 Goals are under 'goals' in a test and never change a verdict; results.json has them. A passed run scores the weighted
 mean of its goals from 0 to 1 (1 without goals), a failed one 0. A team's score is the mean over all tests that any team
@@ -259,44 +243,7 @@ samples of the ranges of the tests (dodo run --samples).
 """
 
 
-_WIDE, _HIGH = 180, 16
-"""px of a bar from 0 to 1."""
-
-
-def as_page(ranking: Sequence[TeamScore]) -> str:
-    """The table, and the mean score of each test."""
-    look = style()
-    page = environment().get_template("report/ranking.html.j2")
-    return page.render(
-        ranking=ranking, head=HEAD, cells=cells, bar=bar, in_words=in_words, method=METHOD, version=__version__,
-        style=look, hash=source_hash,
-    )  # fmt: skip
-
-
-def in_words(test: TestScore) -> str:
-    """``0.912``, ``0.433, 2 of 8 failed`` or ``no answer``"""
-    if not test.scores:
-        return "no answer"
-    return f"{test.mean:.3f}" + (f", {test.failed} of {len(test.scores)} failed" if test.failed else "")
-
-
-def bar(team: TeamScore) -> Markup:
-    """An SVG: the score as a bar from 0 to 1, its interval as a line."""
-    colour = "var(--failed)" if team.failure_rate else "var(--passed)"
-    middle = _HIGH / 2
-    line = ""
-    if team.interval:
-        low, high = (_WIDE * end for end in team.interval)
-        ends = f'x1="{low:.1f}" x2="{high:.1f}" y1="{middle:g}" y2="{middle:g}"'
-        line = f'<line {ends} stroke="currentColor" stroke-width="2"/>'
-    return Markup(  # noqa: S704  (numbers alone)
-        f'<svg width="{_WIDE}" height="{_HIGH}" role="img" aria-label="{team.score:.3f}">'
-        f'<rect width="{_WIDE}" height="{_HIGH}" fill="none" stroke="var(--line)"/>'
-        f'<rect width="{_WIDE * team.score:.1f}" height="{_HIGH}" fill="{colour}" opacity="0.5"/>{line}</svg>'
-    )
-
-
-FORMATS = {"text": as_text, "markdown": as_markdown, "json": as_json, "html": as_page}
+FORMATS = {"text": as_text, "markdown": as_markdown, "json": as_json}
 
 
 def add(parser: argparse.ArgumentParser) -> None:
