@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl import atomic, package_data
-from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import Exit, UsageError, require_extra
-from dodo_dsl.cli.numbers import minutes, positive, seed
-from dodo_dsl.cli.report import REPORT
-from dodo_dsl.cli.search_session import INTERRUPTED, SearchSession, session
+from dodo_dsl.cli.numbers import minutes, positive
+from dodo_dsl.cli.search_session import INTERRUPTED, SearchSession, add_common, session
 from dodo_dsl.cli.uninterrupted import undisturbed
 from dodo_dsl.search.findings import Findings, document, failures_of, lines
 from dodo_dsl.search.search_loop import SearchLoop
@@ -59,15 +57,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--until-failure", action="store_true", help="end soon after the first failure, and reduce it")
     parser.add_argument("--save", action="store_true", help="save a test of each failure next to TEST")
-    parser.add_argument("--seed", type=seed, default=0, metavar="S", help="seed of the search (default: 0)")
-    parser.add_argument(
-        "-j", "--jobs", type=positive, metavar="N", help="concurrent drives (default: as many as the cores allow)"
-    )
-    parser.add_argument("--isolation", choices=("network", "host"), help="override the spec's isolation")
-    parser.add_argument(
-        "--report", type=Path, default=REPORT, metavar="DIR",
-        help="store the search in DIR/search/TEST (default: dodo-report)"
-    )  # fmt: skip
+    add_common(parser, "DIR/search/TEST")
     parser.add_argument(
         "--storage", metavar="URL",
         help="database or file whose drives all workers share (default: a file in DIR/search/TEST)"
@@ -76,7 +66,6 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--finish", action="store_true", help="do not search further: reduce the failures found, and write the result"
     )
-    selection.add_application(parser)
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:

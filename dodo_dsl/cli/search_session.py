@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self, TextIO, cast
+from typing import Any, TextIO, cast
 
 from dodo_dsl import compiler
 from dodo_dsl.cli import selection
@@ -14,12 +14,12 @@ from dodo_dsl.cli.display import write_diagnostics
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.forecast import expectation
 from dodo_dsl.cli.loading import Loading, loading
-from dodo_dsl.cli.progress import about, count
+from dodo_dsl.cli.numbers import positive, seed
+from dodo_dsl.cli.progress import NoProgress, about, count
+from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors
 from dodo_dsl.diagnostics import has_errors, ordered, told_once
-from dodo_dsl.outcome import Outcome
 from dodo_dsl.run.backends import CombinedBackends
-from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
 from dodo_dsl.search.drives import Drives, KeptBackends, end_like_interrupt
@@ -31,6 +31,19 @@ from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.terminal import printable, unescaped
 
 INTERRUPTED = "interrupted: the same command goes on from here\n"
+
+
+def add_common(parser: argparse.ArgumentParser, place: str) -> None:
+    """What both commands have; ``place`` is where their results are."""
+    parser.add_argument("--seed", type=seed, default=0, metavar="S", help="seed of all values (default: 0)")
+    parser.add_argument(
+        "-j", "--jobs", type=positive, metavar="N", help="concurrent drives (default: as many as the cores allow)"
+    )
+    parser.add_argument("--isolation", choices=("network", "host"), help="override the specs' isolation")
+    parser.add_argument(
+        "--report", type=Path, default=REPORT, metavar="DIR", help=f"store the result in {place} (default: dodo-report)"
+    )
+    selection.add_application(parser)
 
 
 @dataclass(frozen=True)
@@ -85,7 +98,7 @@ def session(options: argparse.Namespace, stdout: TextIO) -> Iterator[SearchSessi
         yield SearchSession(options, cast(TextIO, UninterruptedStream(stdout)), folder.path, load)
 
 
-class SearchProgress:
+class SearchProgress(NoProgress):
     """Shows each drive in a line, or in one that moves on a terminal.
 
     ``total`` drives are wanted; without it the search ends by time, at ``deadline`` of the monotonic clock.
@@ -97,12 +110,6 @@ class SearchProgress:
         self._driven = 0
         self._status = _status(stream) if stream.isatty() else None
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Goes on with the next round."""
-
     def close(self) -> None:
         if self._status is not None:
             self._status.stop()
@@ -111,18 +118,6 @@ class SearchProgress:
     def note(self, text: str) -> None:
         self._stream.write(f"{printable(text)}\n")
         self._stream.flush()
-
-    def phase(self, slug: str, text: str) -> None:
-        """Phases of single drives are not shown."""
-
-    def standing(self, slug: str, standing: Standing) -> None:
-        """How far a drive is is not shown."""
-
-    def rest(self, seconds: float, tests: int) -> None:
-        """The rest of a round is not shown."""
-
-    def done(self, outcome: Outcome) -> None:
-        """What becomes a drive is shown as one."""
 
     def driven(self, drive: Drive, known: Collection[Drive]) -> None:
         """Shows a drive of this command, and counts all that are known."""

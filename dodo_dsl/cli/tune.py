@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl import atomic
-from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import Exit, require_extra
-from dodo_dsl.cli.numbers import minutes, positive, seed
-from dodo_dsl.cli.report import REPORT
-from dodo_dsl.cli.search_session import INTERRUPTED, SearchSession, session
+from dodo_dsl.cli.numbers import minutes, positive
+from dodo_dsl.cli.search_session import INTERRUPTED, SearchSession, add_common, session
 from dodo_dsl.cli.uninterrupted import undisturbed
 from dodo_dsl.search.store import Store, opened
 from dodo_dsl.search.study import Study, tune_study
@@ -47,16 +45,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--samples", type=positive, default=0, metavar="N",
         help="drive each test at N samples of its ranges, too; N others judge the result",
     )  # fmt: skip
-    parser.add_argument("--seed", type=seed, default=0, metavar="S", help="seed of values and samples (default: 0)")
-    parser.add_argument(
-        "-j", "--jobs", type=positive, metavar="N", help="concurrent drives (default: as many as the cores allow)"
-    )
-    parser.add_argument("--isolation", choices=("network", "host"), help="override the specs' isolation")
-    parser.add_argument(
-        "--report", type=Path, default=REPORT, metavar="DIR",
-        help="store the result in DIR/tune (default: dodo-report)",
-    )  # fmt: skip
-    selection.add_application(parser)
+    add_common(parser, "DIR/tune")
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:

@@ -101,30 +101,30 @@ def find(
     test: str, seed: int, space: Space, nominal: Drive | None, swept: Sequence[Drive], proposed: Sequence[Drive] = ()
 ) -> Findings:
     """What the drives of a sweep and those that the optimiser proposed say."""
-    judged = [drive for drive in swept if drive.outcome != "error"]
-    failed = [drive for drive in judged if drive.outcome == "failed"]
-    rated = [drive.values for drive in swept]
-    others = [drive for drive in proposed if drive.values not in rated]
-    further = [drive for drive in others if drive.outcome != "error"]
-    left_out = [drive for drive in (*swept, *others) if drive.outcome == "error"]
-    further_failed = [drive for drive in further if drive.outcome == "failed"]
+
+    def of(drives: Sequence[Drive], *outcomes: str) -> list[Drive]:
+        return [drive for drive in drives if drive.outcome in outcomes]
+
+    others = [drive for drive in proposed if drive.values not in [one.values for one in swept]]
+    judged, further = of(swept, "passed", "failed"), of(others, "passed", "failed")
+    failed, left_out = of(swept, "failed"), of([*swept, *others], "error")
     low, high = interval(len(failed), len(judged))
     return Findings(
         test,
         seed,
         nominal,
-        len(judged),
-        len(failed),
-        len(left_out),
-        len(further),
-        len(further_failed),
-        len(failed) / len(judged) if judged else None,
-        low,
-        high,
-        tuple(sorted(_influences(space, judged), key=lambda one: -abs(one.correlation))),
-        min((*judged, *further), key=_margin, default=None),
-        tuple(failures_of([*failed, *further_failed])),
-        tuple(failures_of(left_out)),
+        judged=len(judged),
+        failed=len(failed),
+        errors=len(left_out),
+        proposed=len(further),
+        proposed_failed=len(of(further, "failed")),
+        rate=len(failed) / len(judged) if judged else None,
+        low=low,
+        high=high,
+        influences=tuple(sorted(_influences(space, judged), key=lambda one: -abs(one.correlation))),
+        worst=min((*judged, *further), key=_margin, default=None),
+        failures=tuple(failures_of([*failed, *of(further, "failed")])),
+        left_out=tuple(failures_of(left_out)),
     )
 
 

@@ -8,7 +8,7 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Generator, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
@@ -35,8 +35,8 @@ _NOT_WORD = re.compile(r"[^a-z0-9]+")
 _MOST_NAME, _LEAST_OF_TEST = 60, 20
 """Characters of a name, as the schema has it, and those of the test's that it keeps at least."""
 
-Shrinking = Generator[list[Values], Sequence[bool], Values]
-"""Asks which of some values still fail for the same reason, and returns the last ones."""
+Fails = Callable[[list[Values]], Awaitable[list[bool]]]
+"""Which of some values fail for the same reason."""
 
 
 @dataclass
@@ -63,21 +63,15 @@ class Shrinker:
         for values, drive in sorted(of_kind, key=lambda one: distance(self.study.space, one[0]))[:MOST_TRIED]:
             await self._drive([values], 2)
             if self._fails(values, drive, 2):
-                shrunk = await self._shrunk(values, drive)
+
+                async def fails(asked: list[Values], like: Drive = drive) -> list[bool]:
+                    await self._drive(asked)
+                    return [self._fails(one, like) for one in asked]
+
+                shrunk = await shrink(self.study.space, values, fails)
                 if texts(shrunk) not in [one.values for one in self.found]:
                     self.found.append(await self._confirmed(shrunk))
                 return
-
-    async def _shrunk(self, values: Values, first: Drive) -> Values:
-        steps = shrink(self.study.space, values)
-        try:
-            asked = next(steps)
-            while True:
-                await self._drive(asked)
-                asked = steps.send([self._fails(one, first) for one in asked])
-        except StopIteration as end:
-            shrunk: Values = end.value
-            return shrunk
 
     async def _drive(self, candidates: list[Values], repeat: int = 1) -> None:
         points = [point_at(self.study.test.spec, values, repeat) for values in candidates]
@@ -129,31 +123,29 @@ def changed(space: Space, values: Values) -> list[str]:
     return [one.name for one in space.ranges if values[one.name].text != one.nominal.text]
 
 
-def shrink(space: Space, values: Values) -> Shrinking:
+async def shrink(space: Space, values: Values, fails: Fails) -> Values:
     """Values that fail, from others that do."""
-    values = yield from _fewer(space, values)
+    values = await _fewer(space, values, fails)
     for one in space.ranges:
         if not one.is_list and one.name in changed(space, values):
-            values = yield from _nearer(space, values, one)
+            values = await _nearer(space, values, one, fails)
     return values
 
 
-def _fewer(space: Space, values: Values) -> Shrinking:
+async def _fewer(space: Space, values: Values, fails: Fails) -> Values:
     """Puts values back to nominal, one after the other, until none of them can be."""
     plain = nominal(space)
     while names := changed(space, values):
         single = [values | {name: plain[name]} for name in names]
-        fails = yield single
-        free = [name for name, still in zip(names, fails, strict=True) if still]
+        free = [name for name, still in zip(names, await fails(single), strict=True) if still]
         if not free:
             return values
         more = [values | {name: plain[name] for name in free[: n + 1]} for n in range(len(free))]
-        fails = yield more
-        values = next((one for one, still in zip(reversed(more), reversed(fails), strict=True) if still), more[0])
+        values = [more[0], *(one for one, still in zip(more, await fails(more), strict=True) if still)][-1]
     return values
 
 
-def _nearer(space: Space, values: Values, one: Range) -> Shrinking:
+async def _nearer(space: Space, values: Values, one: Range, fails: Fails) -> Values:
     """Moves a number towards its nominal value, as far as it still fails."""
     passes, fails_at = one.number(one.nominal.text), one.number(values[one.name].text)
     step = Decimal(1) if one.name in space.whole else step_of(one)
@@ -164,8 +156,7 @@ def _nearer(space: Space, values: Values, one: Range) -> Shrinking:
         if not between:
             break
         tried = [values | {one.name: scalar(one, number)} for number in between]
-        fails = yield tried
-        first = next((n for n, still in enumerate(fails) if still), None)
+        first = next((n for n, still in enumerate(await fails(tried)) if still), None)
         if first is None:
             passes = between[-1]
             continue

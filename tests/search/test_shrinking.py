@@ -1,5 +1,6 @@
 """Failures reduced, against areas in which drives fail, and the names of their tests."""
 
+import asyncio
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -30,15 +31,14 @@ def shrunk(start: tuple[float, ...], rule: Fails) -> tuple[Values, int]:
     """The values, and how many drives they took."""
     first = SPACE.values(start)
     assert fails(first, rule)
-    steps, number = shrink(SPACE, first), 0
-    asked = next(steps)
-    while True:
-        number += len(asked)
-        try:
-            asked = steps.send([fails(values, rule) for values in asked])
-        except StopIteration as end:
-            values: Values = end.value
-            return values, number
+    number = 0
+
+    async def asked(tried: list[Values]) -> list[bool]:
+        nonlocal number
+        number += len(tried)
+        return [fails(values, rule) for values in tried]
+
+    return asyncio.run(shrink(SPACE, first, asked)), number
 
 
 @pytest.mark.parametrize(
