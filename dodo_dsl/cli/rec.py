@@ -19,10 +19,6 @@ EXAMPLES = """examples:
   dodo rec export drive.rec --ros -o bag                          a bag of ROS 2, for RViz and others
   dodo rec import recorded -o drive-1.rec                         a recording of a bag, by the types of its topics
 """
-_CUT = """examples:
-  dodo rec cut drive.rec -o curve.rec --start 4 --end 9.5
-  dodo rec cut drive.rec -o front.rec --message opendlv.proxy.DistanceReading/0 --message 1090
-"""
 _EXPORT = """examples:
   dodo rec export drive.rec --csv -o tables
   dodo rec export drive.rec --frames -o pictures --pictures jpg
@@ -44,22 +40,14 @@ _FORMATS = {
     "mcap": "write an MCAP file for Foxglove, Lichtblick or rerun (needs DoDo's extra 'mcap')",
     "ros": "write a bag of ROS 2, a topic for each message that has a type there (needs DoDo's extra 'ros')",
 }
-_IMPORT = """examples:
-  dodo rec import recorded -o drive-1.rec
-  dodo rec import recorded/recorded.mcap --lossy
-"""
-_INFO = """examples:
-  dodo rec info drive.rec
-  dodo rec info drive.rec --json --no-decode
-"""
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-    info = _action(actions, "info", "show messages, rates, gaps, frames and damage of a recording", _INFO)
+    info = _action(actions, "info", "show messages, rates, gaps, frames and damage of a recording")
     info.add_argument("--json", action="store_true", help="output as JSON")
     info.add_argument("--no-decode", action="store_true", help="count camera frames without decoding them")
-    cut = _action(actions, "cut", "copy a part of a recording into a new one, byte for byte", _CUT)
+    cut = _action(actions, "cut", "copy a part of a recording into a new one, byte for byte")
     cut.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="new recording")
     export = _action(actions, "export", "export a recording for other tools", _EXPORT)
     what = export.add_mutually_exclusive_group(required=True)
@@ -94,7 +82,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     for action in (cut, export):
         _selection(action)
     text = "make a recording of a bag of ROS 2, by the types of its topics (needs DoDo's extra 'ros')"
-    imported = _action(actions, "import", text, _IMPORT)
+    imported = _action(actions, "import", text)
     imported.add_argument(
         "-o", "--output", metavar="FILE", type=Path, help="new recording (default: the bag's name with .rec)"
     )
@@ -105,7 +93,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def _action(
-    actions: "argparse._SubParsersAction[argparse.ArgumentParser]", name: str, text: str, examples: str
+    actions: "argparse._SubParsersAction[argparse.ArgumentParser]", name: str, text: str, examples: str | None = None
 ) -> argparse.ArgumentParser:
     action = actions.add_parser(
         name, help=text, description=text, epilog=examples, formatter_class=argparse.RawDescriptionHelpFormatter

@@ -17,9 +17,8 @@ from dodo_dsl.cli.rec_actions import RecJob, opened, tell
 from dodo_dsl.opendlv.assets import truth_file
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.rec import coco, csv_table, steering
-from dodo_dsl.rec import video as rec_video
 from dodo_dsl.rec.coco import LabelError
-from dodo_dsl.rec.frames import images_of
+from dodo_dsl.rec.frames import FramesError, PictureSet, frame_names, images_of, write_picture
 from dodo_dsl.rec.recording_filter import NothingSelected
 from dodo_dsl.rec.steering import split_recordings
 from dodo_dsl.rec.video import MOST_GAP, write_video
@@ -83,20 +82,19 @@ def boxes_of(job: RecJob, rows: Numbers, images: Numbers) -> Mapping[int, list[c
     return found
 
 
-def _tell_lost(job: RecJob, lost: int, of: int) -> None:
-    if lost:
-        job.tell(f"{lost} of {of} packets cannot be decoded")
-
-
 def _frames(job: RecJob) -> None:
     recording, options, folder = job.recording, job.options, job.folder()
     images, _ = images_for(job)
-    names = rec_video.frame_names(recording, images, options.pictures)
-    refuse_existing([folder / name for name in names], options.force)
+    refuse_existing([folder / name for name in frame_names(recording, images, options.pictures)], options.force)
     with atomic.files_into(folder) as place, job.progress("decoding frames", len(images)) as progress:
-        written = rec_video.write_frames(recording, images, options.pictures, place, progress, job.tell)
-    _tell_lost(job, len(images) - written, len(images))
-    job.stdout.write(f"{folder}: {written} frames\n")
+        pictures = PictureSet(place, options.pictures, job.tell, inside="")
+        for _, frame, file in pictures.frames(recording, images, "", progress):
+            write_picture(place / file, frame)
+        if pictures.lost == len(images):
+            raise FramesError(f"no frame of {recording.path} can be decoded")
+    for text in pictures.notes():
+        job.tell(text)
+    job.stdout.write(f"{folder}: {len(images) - pictures.lost} frames\n")
 
 
 def _video(job: RecJob) -> None:

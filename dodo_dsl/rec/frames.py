@@ -1,5 +1,6 @@
 """The camera frames of a recording, decoded."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,6 @@ from dodo_dsl.opendlv.video import DecodedFrame, VideoDecoder, VideoError, refus
 
 MOST_DECODERS = 16
 _JPEG_QUALITY = 95
-PICTURES = "images"
 
 
 class FramesError(ValueError):
@@ -100,26 +100,39 @@ def write_picture(path: Path, frame: DecodedFrame) -> None:
     path.write_bytes(data.tobytes())
 
 
+def frame_names(recording: Recording, images: Numbers, picture_type: str) -> list[str]:
+    """A file name for each image message: sender stamp and sample time in us, and a number where both are taken."""
+    index, taken = recording.index[images], Counter[tuple[int, int]]()
+    found = []
+    for key in zip(index["sender_stamp"].tolist(), index["sampled"].tolist(), strict=True):
+        taken[key] += 1
+        number = f"-{taken[key]}" if taken[key] > 1 else ""
+        found.append(f"{key[0]}-{key[1]}{number}.{picture_type}")
+    return found
+
+
 @dataclass
 class PictureSet:
-    """Pictures with labels in ``folder``, as ``png`` or ``jpg``; ``problem`` gets what cannot be decoded at all."""
+    """Pictures ``inside`` a folder, as ``png`` or ``jpg``; ``problem`` gets what cannot be decoded at all."""
 
     folder: Path
     picture_type: str
     problem: Callable[[str], None]
+    inside: str = "images/"
     lost: int = 0
 
     def frames(
         self, recording: Recording, images: Numbers, name: str, progress: Callable[[int], None]
     ) -> Iterator[tuple[Packet, DecodedFrame, str]]:
         """The frames of a recording with the files for them; those in an earlier recording of the set have others."""
-        (self.folder / PICTURES).mkdir(parents=True, exist_ok=True)
-        for done, (packet, frame) in enumerate(decoded(recording, images, self.problem), 1):
+        (self.folder / self.inside).mkdir(parents=True, exist_ok=True)
+        files = frame_names(recording, images, self.picture_type)
+        pairs = zip(files, decoded(recording, images, self.problem), strict=True)
+        for done, (file, (packet, frame)) in enumerate(pairs, 1):
             if frame is None:
                 self.lost += 1
             else:
-                file = f"{name}{packet.sender_stamp}-{packet.sample_time}.{self.picture_type}"
-                yield packet, frame, f"{PICTURES}/{file}"
+                yield packet, frame, f"{self.inside}{name}{file}"
             progress(done)
 
     def notes(self) -> Iterator[str]:

@@ -1,10 +1,9 @@
-"""The frames of a camera as an MP4, each shown at its time, or as images, a file each.
+"""The frames of a camera as an MP4, each shown at its time.
 
-In the MP4 packets of H.264 are as they were recorded, others encoded again.
+Packets of H.264 are as they were recorded, others encoded again.
 """
 
 import io
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from typing import Any
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.video import CODECS, FORMAT, VideoEncoder, VideoError, has_key_frame, refuse_large
-from dodo_dsl.rec.frames import FramesError, decoded, packets, write_picture
+from dodo_dsl.rec.frames import FramesError, decoded, packets
 
 MOST_GAP = 1_800_000_000
 """us between two frames; an MP4 counts the time of a frame in 32 bits."""
@@ -132,39 +131,3 @@ def _encoded(recording: Recording, images: Numbers, problem: Callable[[str], Non
             sizes = f"a frame of {frame.width} x {frame.height} pixels follows such of {size[0]} x {size[1]}"
             raise VideoError(f"{sizes}{_CHOOSE}")
         yield number, encoder.encode(frame.pixels("bgr"))
-
-
-def frame_names(recording: Recording, images: Numbers, picture_type: str) -> list[str]:
-    """A file name for each image message: sender stamp and sample time in us, and a number where both are taken."""
-    index, taken = recording.index[images], Counter[tuple[int, int]]()
-    found = []
-    for key in zip(index["sender_stamp"].tolist(), index["sampled"].tolist(), strict=True):
-        taken[key] += 1
-        number = f"-{taken[key]}" if taken[key] > 1 else ""
-        found.append(f"{key[0]}-{key[1]}{number}.{picture_type}")
-    return found
-
-
-def write_frames(
-    recording: Recording,
-    images: Numbers,
-    picture_type: str,
-    folder: Path,
-    progress: Callable[[int], None],
-    problem: Callable[[str], None],
-) -> int:
-    """Write each frame that can be decoded into ``folder``, as ``png`` or ``jpg``; returns how many they are.
-
-    ``progress`` gets the number of packets done, ``problem`` a sentence about what cannot be decoded at all. Raises
-    FramesError if that is all of them, and OSError.
-    """
-    written = 0
-    pairs = zip(frame_names(recording, images, picture_type), decoded(recording, images, problem), strict=True)
-    for done, (name, (_, frame)) in enumerate(pairs, 1):
-        if frame is not None:
-            write_picture(folder / name, frame)
-            written += 1
-        progress(done)
-    if not written:
-        raise FramesError(f"no frame of {recording.path} can be decoded")
-    return written
