@@ -194,7 +194,6 @@ def render(
             machine_line=machine_line,
             megabytes=megabytes,
             history=history,
-            explained=_explained(outcomes),
             compared={one.test: one for one in compared(outcomes)},
             margin=worst_margin,
             comparison=comparison,
@@ -208,17 +207,6 @@ def render(
         )
     )
     return _INDENT.sub("\n", page)
-
-
-def _explained(outcomes: Sequence[Outcome]) -> dict[str, str]:
-    """What the checks of all tests mean, once each; a name that means two things is explained by the first of them."""
-    found: dict[str, str] = {}
-    for outcome in outcomes:
-        names = [check["name"] for check in outcome.checks]
-        for check in outcome.checks:
-            if check["name"] not in found and (words := checks.meaning(check, names)):
-                found[check["name"]] = words
-    return dict(sorted(found.items()))
 
 
 def style() -> str:

@@ -14,11 +14,8 @@
   }
 
   function isWanted(test, words) {
-    for (const name of ["outcome", "level", "change"]) {
-      const wanted = form.elements[name] ? form.elements[name].value : "";
-      if (wanted && wanted !== "all" && test.element.dataset[name] !== wanted) return false;
-    }
-    return words.every((word) => text(test).includes(word));
+    const wanted = form.elements.outcome.value;
+    return (wanted === "all" || test.element.dataset.outcome === wanted) && words.every((word) => text(test).includes(word));
   }
 
   function filter() {
@@ -66,18 +63,6 @@
     target.querySelector("details").open = true;
     target.scrollIntoView();
   }
-
-  // What its checks mean stands beside them when a test's details open; the page has each explanation once.
-  const meanings = new Map(Array.from(document.querySelectorAll("#_meanings dt"), (each) => [each.textContent, each.nextSibling.textContent]));
-  function explain(details) {
-    for (const cell of details.querySelectorAll(".checks td:first-child, .counted b")) {
-      const meaning = meanings.get(cell.textContent);
-      if (!meaning) continue;
-      if (cell.localName === "b") cell.title = meaning;
-      else cell.append(Object.assign(document.createElement("small"), { textContent: meaning }));
-    }
-  }
-  for (const { element } of tests) element.querySelector("details").addEventListener("toggle", (event) => explain(event.target), { once: true });
 
   form.addEventListener("input", (event) => (event.target.name === "sort" ? sort() : filter()));
   form.addEventListener("submit", (event) => event.preventDefault());

@@ -23,14 +23,6 @@ dodo.plots = (function () {
 
   const plain = (channel, field) => ({ title: field.title, unit: field.unit, times: channel.times, values: field.values, note: channel.every > 1 ? `one of ${channel.every} samples` : "" });
 
-  // How many messages of a channel came in each part of the test, as messages a second.
-  function rate(channel) {
-    const wide = Math.max(0.5, cursor.last / 100);
-    const counts = new Float32Array(Math.max(1, Math.ceil(cursor.last / wide)));
-    for (const time of channel.times) if (time >= 0) counts[Math.min(counts.length - 1, Math.floor(time / wide))] += channel.every / wide;
-    return { title: `${channel.message.split(".").pop()}/${channel.sender} a second`, unit: "1/s", min: 0, isPlain: true, times: Float32Array.from(counts, (_, n) => n * wide), values: counts };
-  }
-
   // Boxes of each frame by what became of them, one on top of the other.
   function detected() {
     const sums = KINDS.map((_, n) => data.frames.map((frame) => KINDS.slice(n).reduce((sum, [kind]) => sum + frame[kind].length, 0)));
@@ -48,9 +40,7 @@ dodo.plots = (function () {
 
   function judged() {
     const channels = data.test.messages.flatMap((each) => data.channels.filter((c) => c.message === each.message && (each.sender === null || c.sender === each.sender)));
-    const list = [...data.test.judged.map(recorded), ...channels.flatMap((channel) => used(channel.fields).map((field) => plain(channel, field))), ...(data.frames.length ? [detected()] : [])];
-    const isAny = data.test.checks.length > 0;
-    return isAny ? list : [...list, ...others().filter(({ message }) => /^opendlv\.proxy\..*Request$/.test(message)).map(rate)];
+    return [...data.test.judged.map(recorded), ...channels.flatMap((channel) => used(channel.fields).map((field) => plain(channel, field))), ...(data.frames.length ? [detected()] : [])];
   }
 
   function heights(signal) {
@@ -222,7 +212,6 @@ dodo.plots = (function () {
       const options = entries.map(([name, choice]) => make("option", { value: choices.push(choice) - 1 }, name));
       if (options.length) select.append(make("optgroup", { label }, ...options));
     };
-    group("Messages a second", others().map((channel) => [`${channel.message}/${channel.sender}`, () => rate(channel)]));
     for (const channel of others()) group(`${channel.message}/${channel.sender}`, channel.fields.map((field) => [field.name, () => plain(channel, field)]));
     select.addEventListener("change", () => {
       if (select.value !== "") add(parent, choices[Number(select.value)](), true).scrollIntoView({ block: "nearest" });

@@ -1,20 +1,15 @@
 """What repetitions of a test in lockstep have to have in common."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import pytest
 
-from dodo_dsl import package_data
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.report import results
 from dodo_dsl.report.repetitions import Repeated, path_of, repeated
-from dodo_dsl.report.results import Circumstances
 from tests.report.test_report_folder import OUTCOME
 
 
@@ -62,11 +57,6 @@ def test_any_other_value_that_differs_is_named_with_its_runs(
     assert list(found.lines()) == ["test--run-1: the 3 runs in lockstep differ", f"        {words}"]
 
 
-def test_of_many_values_some_are_shown(tmp_path: Path) -> None:
-    (found,) = among(tmp_path, *(replace(FIRST, sim_s=float(n)) for n in range(9)))
-    assert list(found.lines())[1].endswith("; 3.0 s in run 4; and 5 more")
-
-
 def test_the_path_is_compared_by_its_messages_alone(tmp_path: Path) -> None:
     messages = MessageSet.standard()
 
@@ -90,15 +80,3 @@ def test_in_real_time_and_of_single_runs_nothing_is_compared(tmp_path: Path) -> 
     steady = replace(FIRST, clock="realtime")
     assert among(tmp_path, steady, replace(steady, sim_s=5.0)) == []
     assert among(tmp_path, FIRST) == []
-
-
-def test_results_hold_them(tmp_path: Path) -> None:
-    (found,) = among(tmp_path, FIRST, replace(FIRST, reason="\udc80"))
-    circumstances = Circumstances(repeated=(found,))
-    text = results.to_json([FIRST], circumstances)
-    jsonschema.validate(json.loads(text), json.loads((package_data.schemas() / "results.schema.json").read_text()))
-    (tmp_path / "results.json").write_text(text)
-    read = results.read_given(tmp_path / "results.json")
-    assert read.circumstances.repeated[0].differing[0].values == ("reached it", "?")
-    assert results.joined([read, read]).repeated == 2 * read.circumstances.repeated
-    assert "repeated" not in results.to_json([FIRST])

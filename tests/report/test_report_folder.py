@@ -11,7 +11,7 @@ from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.outcome import Outcome, with_margin
 from dodo_dsl.report import results
-from dodo_dsl.report.files import forget
+from dodo_dsl.report.files import SHARED, forget
 from dodo_dsl.report.next_report import Drawings
 from dodo_dsl.report.report_folder import Drawable, write_summaries
 from dodo_dsl.report.viewer import page as viewer_page
@@ -90,7 +90,7 @@ def test_the_page_leads_to_spec_and_recording(tmp_path: Path, monkeypatch: pytes
     assert page.count('class="about"') == 1
     assert re.findall(r'href="([^"#]*)"', page) == ["data:,", "../../t/t.dodo.yml", "test/test.rec"]
     assert "<dt>Test</dt><dd>t/gone.dodo.yml</dd>" in page
-    assert "<dt>late</dt><dd>samples or detections that came too late to be judged, ignored</dd>" in page
+    assert '<span title="samples or detections that came too late to be judged, ignored"><b>late</b>' in page
     assert "<b>mean</b> 2</span>" in page
     assert "<td>at most 0.75\u00a0s</td><td>0.25\u00a0s</td>" in page
 
@@ -138,3 +138,12 @@ def test_what_cannot_be_drawn_is_said_and_half_a_page_is_none(tmp_path: Path, mo
     assert drawings.problems() == [f"the page of {OUTCOME.name} cannot be written: no room"]
     write_summaries(tmp_path, [OUTCOME])
     assert "drive.html" not in (tmp_path / "index.html").read_text()
+
+
+def test_shared_files_are_written_through_no_symlink(tmp_path: Path) -> None:
+    (tmp_path / "others").mkdir()
+    (tmp_path / "report").mkdir()
+    (tmp_path / "report" / SHARED).symlink_to(tmp_path / "others")
+    viewer_page.write_shared(tmp_path / "report", [])
+    assert list((tmp_path / "others").iterdir()) == []
+    assert (tmp_path / "report" / SHARED / "main.js").is_file()

@@ -12,6 +12,7 @@ import pytest
 from dodo_dsl.outcome import MachineLoad, NotRun, Response, ServiceUse, Wait
 from dodo_dsl.report import results
 from dodo_dsl.report.files import forget
+from dodo_dsl.report.repetitions import Difference, Repeated
 from dodo_dsl.report.report_folder import write_summaries
 from dodo_dsl.report.results import GivenReport, Repository, RunRecord
 from dodo_dsl.spec.model import Goal
@@ -57,15 +58,6 @@ LOAD = MachineLoad(
 )
 
 
-@pytest.mark.parametrize("load", [None, LOAD, MachineLoad(7.5)], ids=["lockstep", "measured", "not measured"])
-def test_the_load_of_the_machine_is_kept_in_milliseconds(tmp_path: Path, load: MachineLoad | None) -> None:
-    (tmp_path / "results.json").write_text(results.to_json([replace(OUTCOME, machine=load)]))
-    assert results.load(tmp_path / "results.json")[0].machine == load
-    rough = replace(LOAD, others_share=0.61049, application=Wait(1.00049, 2.0, 1.9, "app"))
-    (tmp_path / "results.json").write_text(results.to_json([replace(OUTCOME, machine=rough)]))
-    assert results.load(tmp_path / "results.json")[0].machine == LOAD
-
-
 def test_what_services_used_is_kept_and_drawn(tmp_path: Path) -> None:
     uses = (
         ServiceUse("steering", 1.23456, 0.25049, 150_000_000, 5e6, 2_000_000_000),
@@ -82,12 +74,6 @@ def test_what_services_used_is_kept_and_drawn(tmp_path: Path) -> None:
         second.in_words()
         == "2.00 s of processor time, up to 1,460 MB of memory, and the test was too short to measure its growth"
     )
-
-
-def test_goals_are_kept(tmp_path: Path) -> None:
-    outcome = replace(OUTCOME, goals=(Goal("time-to-goal", 20.0, 5.0, 2.0), Goal("gates", 0.0, 3.0)))
-    (tmp_path / "results.json").write_text(results.to_json([outcome]))
-    assert results.load(tmp_path / "results.json") == [outcome]
 
 
 def test_results_that_cannot_be_read_stop_no_run(tmp_path: Path) -> None:
@@ -164,7 +150,12 @@ def test_the_first_problem_is_told_in_a_sentence(tmp_path: Path, tests: object) 
     assert len(str(caught.value)) < 1000
 
 
-def test_the_schema_is_what_the_classes_say() -> None:
+def test_the_schema_is_what_the_classes_say_and_what_is_written_is_read(tmp_path: Path) -> None:
     assert results_schema.FILE.read_text() == results_schema.text(), "run `make schema`"
-    document = json.loads(results.to_json([WHOLE], results.Circumstances((RUN,), (NOT_RUN,))))
+    repeated = Repeated("a", ("a", "b"), (Difference("gap", ("1", "2")),))
+    text = results.to_json([WHOLE], circumstances := results.Circumstances((RUN,), (NOT_RUN,), (repeated,)))
+    document = json.loads(text)
     jsonschema.validate(document, json.loads(results_schema.text()))
+    (tmp_path / "results.json").write_text(text)
+    found = results.read_given(tmp_path)
+    assert (found.outcomes, found.circumstances) == ((WHOLE,), circumstances)

@@ -104,17 +104,6 @@ def test_nothing_else_is_replaced(tmp_path: Path, jobs: tuple[Path, Path]) -> No
     assert tree(tmp_path) == before
 
 
-def test_the_working_folder_becomes_the_report(
-    tmp_path: Path, jobs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "out").mkdir()
-    monkeypatch.chdir(tmp_path / "out")
-    for _ in range(2):
-        joined(Path(), *jobs)
-        assert (tmp_path / "out" / "results.json").is_file()
-        assert sorted(path.name for path in tmp_path.iterdir() if path.name.startswith(".")) == []
-
-
 @pytest.mark.parametrize("slug", ["..", "../x", "a/b", "/tmp/x", "", "A", "_viewer", "a" * 241])
 def test_no_slug_leaves_its_report(tmp_path: Path, slug: str) -> None:
     folder = tmp_path / "in"

@@ -76,17 +76,6 @@ def test_boxes_of_frames(tmp_path: Path) -> None:
     assert [label for label, *_ in frame["missed"]] == [label for label, *_ in many]
 
 
-def test_too_many_boxes_are_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recording, "MOST_BOXES", 5)
-
-    def fill(record: Judged) -> None:
-        for number in range(4):
-            record.frame(EPOCH + number, JudgedBoxes([], [("a", 0, 0, 1, 1)] * 2, []))
-
-    found = recorded(tmp_path, fill)
-    assert (len(found.frames(EPOCH)), found.why()) == (2, "Only the first 5 boxes are drawn.")
-
-
 def test_lines_that_are_none_cost_only_themselves(tmp_path: Path) -> None:
     wrong = [{"samples": "gone"}, {"series": 7, "low": "x"}, {"way": []}, {"frames": [1]}, {"parameters": 3}, {}]
     wrong += [{"frames": [[1 << 70, True, []]]}, {"frames": [[EPOCH, True, [["false", "a", 0, 0, 1, float("inf")]]]]}]

@@ -231,16 +231,15 @@ def test_strings_of_others_are_text(chromium: Chromium, hostile_report: Path) ->
 
 
 @pytest.mark.parametrize("page", ["crash"], indirect=True)
-def test_other_signals_and_rates_can_be_added(page: Page) -> None:
-    """Without a verdict the rates of the application's requests are there from the start."""
+def test_other_signals_can_be_added(page: Page) -> None:
     titles = "Array.from(document.querySelectorAll('.plots figcaption b'), e => e.textContent)"
-    assert page.value(titles)[-2:] == ["PedalPositionRequest/0 a second", "GroundSteeringRequest/0 a second"]
+    before = page.value(titles)
     select = "document.querySelector('#signals select')"
     page.value(f"{select}.value = Array.from({select}.options).find(option => option.text === 'qw').value")
     page.value(f"{select}.dispatchEvent(new Event('change'))")
-    assert page.value(titles)[-1] == "qw of Frame"
+    assert page.value(titles) == [*before, "qw of Frame"]
     page.value("document.querySelector('figure:last-child button').click()")
-    assert page.value(titles)[-1] == "GroundSteeringRequest/0 a second"
+    assert page.value(titles) == before
 
 
 @pytest.mark.parametrize("page", ["wall hit", "wrong signal", "missed cones"], indirect=True)
