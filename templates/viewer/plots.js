@@ -50,7 +50,7 @@ dodo.plots = (function () {
       for (const value of values) if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
     }
     if (!Number.isFinite(low + high)) return [0, 1];
-    const pad = Math.max(high - low, 0.02 * Math.abs(high), 1e-6) * 0.08 + near * 0.2;
+    const pad = Math.max(high - low, 0.2 * (Math.max(-low, high) || 1)) * 0.08 + near * 0.2;
     return [signal.isPlain && low === signal.min ? low : Math.min(low, signal.max ?? low) - pad, Math.max(high, signal.min ?? high) + pad];
   }
 
@@ -137,7 +137,7 @@ dodo.plots = (function () {
     const [low, high] = heights(signal);
     const u = new uPlot(
       {
-        width: element.clientWidth || 300, height: element.clientHeight || 80, padding: [signal.isAxis ? 0 : 6, RIGHT, 0, 0], legend: { show: false },
+        width: element.clientWidth || 300, height: element.clientHeight || 80, padding: signal.isAxis ? [0, RIGHT, 0, 0] : [6, RIGHT, 6, 0], legend: { show: false },
         cursor: {
           y: false, sync: { key: "time", setSeries: false }, drag: { x: true, y: false, dist: 4, setScale: false }, points: { show: !signal.isAxis && !signal.stacked },
           bind: {
