@@ -10,6 +10,7 @@ import fcntl
 import gc
 import os
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import TextIO, cast
@@ -28,8 +29,9 @@ from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors, si
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.report.next_report import Drawings, next_report
+from dodo_dsl.report.next_report import next_report
 from dodo_dsl.report.repetitions import Repeated, repeated
+from dodo_dsl.report.report_folder import draw_test
 from dodo_dsl.report.results import Circumstances, GivenReport
 from dodo_dsl.run.backends import COMBINATIONS, Backends, CombinedBackends, Job
 from dodo_dsl.run.process.processes import may_enter
@@ -257,8 +259,13 @@ def run(
     slugs = [job.plan.slug for job in jobs]
     with recording(source) as record, next_report(report.resolve(), slugs, in_place=runner.keep) as target:
         jobs = [replace(job, report=target.folder / job.plan.slug) for job in jobs]
-        with Drawings(target.folder) as drawings, runner.progress:
-            outcomes = asyncio.run(runner.run(jobs, lambda job, outcome: drawings.begin(outcome, drawable(job))))
+        drawn = list[Future[list[str]]]()
+        with ThreadPoolExecutor(1, "drawing") as pool, runner.progress:  # beside the tests that still run
+
+            def draw(job: Job, outcome: Outcome) -> None:
+                drawn.append(pool.submit(draw_test, target.folder, outcome, drawable(job)))
+
+            outcomes = asyncio.run(runner.run(jobs, draw))
         not_run = runner.not_run()
         plans = {job.plan.slug: job.plan for job in jobs}
         about = {s: run_report.Reported(p, target.folder / s, report / s) for s, p in plans.items()}
@@ -270,7 +277,15 @@ def run(
         stdout.flush()
         with undisturbed():
             circumstances = Circumstances((record(),), tuple(not_run), tuple(repeats))
-            written = save_report(target, report, jobs, outcomes, others, circumstances, drawings.problems())
+            written = save_report(
+                target,
+                report,
+                jobs,
+                outcomes,
+                others,
+                circumstances,
+                [problem for each in drawn for problem in each.result()],
+            )
     stdout.writelines(f"{printable(problem)}\n" for problem in written.problems)
     if said is not Verbosity.QUIET or not written.is_whole:
         stdout.write(f"{written.sentence}\n")

@@ -1,8 +1,7 @@
 """Tests of a report that are drawn beside the run, and take their place in the report when all of it is there.
 
 They are written in a hidden folder inside the report's, as only there a rename is sure to work. A run that is killed
-leaves the report before as it was, and its own files for the next run to remove. What the report has of a test is drawn
-as soon as the test has ended, beside the tests that still run.
+leaves the report before as it was, and its own files for the next run to remove.
 """
 
 import contextlib
@@ -11,15 +10,11 @@ import os
 import secrets
 import shutil
 from collections.abc import Collection, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
-from dodo_dsl.outcome import NEXT_REPORT, Outcome
+from dodo_dsl.outcome import NEXT_REPORT
 from dodo_dsl.report.files import forget
-from dodo_dsl.report.report_folder import Drawable, draw_test
 
 
 @dataclass
@@ -100,29 +95,3 @@ def _move(source: Path, target: Path) -> None:
             _move(entry, target / entry.name)
     else:
         source.replace(target)
-
-
-class Drawings:
-    """The pictures and pages of tests in a report's folder, drawn one after the other in a separate thread.
-
-    What was begun is whole when the context ends; after an exception, no further one begins.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._pool = ThreadPoolExecutor(1, "drawing")
-        self._begun = list[Future[list[str]]]()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, _error: object, _trace: TracebackType | None) -> None:
-        self._pool.shutdown(cancel_futures=kind is not None)
-
-    def begin(self, outcome: Outcome, test: Drawable) -> None:
-        """Draws the test of this outcome, which is final."""
-        self._begun.append(self._pool.submit(draw_test, self._folder, outcome, test))
-
-    def problems(self) -> list[str]:
-        """Sentences on what could not be drawn."""
-        return [problem for future in self._begun for problem in future.result()]

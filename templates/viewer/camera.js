@@ -3,7 +3,7 @@
 
 dodo.camera = (function () {
   const { test, at, channels, field, frames, frameAt } = dodo.data;
-  const { make, svg } = dodo.dom;
+  const { choice, make, svg } = dodo.dom;
   const videos = test.videos.filter((each) => each.file).map((each) => ({ ...each, times: Float32Array.from(each.times) }));
   const NAMES = { hit: "true positives", false: "false positives", missed: "missed" };
   const TEXTS = { hit: (each) => each.score.toFixed(2), false: (each) => `false ${each.label}`, missed: (each) => `missed ${each.label}` };
@@ -61,12 +61,16 @@ dodo.camera = (function () {
     const high = WIDE * shape();
     const screen = make("video", { preload: "auto", muted: true });
     const over = svg("svg", { viewBox: `0 0 ${WIDE} ${high}`, role: "img", "aria-label": "What the camera saw" });
-    const choice = make("select", { "aria-label": "Camera", hidden: videos.length < 2 }, ...videos.map((_, n) => make("option", { value: n }, `Camera ${n + 1}`)));
+    const chooser = choice("Camera", videos.map((_, n) => [n, `Camera ${n + 1}`]), (n) => {
+      video = videos[Number(n)];
+      screen.src = video.file;
+    });
+    chooser.hidden = videos.length < 2;
     const text = make("p", { class: "caption" });
     const shown = make("div", { class: "screen" }, screen, over);
     shown.style.aspectRatio = `${WIDE} / ${high}`;
     shown.style.setProperty("--ratio", WIDE / high);
-    parent.append(make("div", { class: "view" }, make("div", { class: "stage" }, shown), make("p", { class: "caption" }, why()), text, choice));
+    parent.append(make("div", { class: "view" }, make("div", { class: "stage" }, shown), make("p", { class: "caption" }, why()), text, chooser));
     parent.classList.add("pictured");
     const seek = (time) => {
       const n = pictured(time);
@@ -75,7 +79,6 @@ dodo.camera = (function () {
       over.replaceChildren(...boxes(frameAt(time)));
       text.textContent = caption(time);
     };
-    choice.addEventListener("change", () => ((video = videos[Number(choice.value)]), (screen.src = video.file)));
     screen.addEventListener("loadedmetadata", () => seek(dodo.cursor.time()));
     if (video) screen.src = video.file;
     dodo.cursor.follow(seek);

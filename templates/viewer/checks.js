@@ -17,7 +17,13 @@ dodo.checks = (function () {
       lines.set(key, { ...place, flags: [...(lines.get(key)?.flags || []), ...(place.flag ? [place.flag] : [])] });
     }
     return [...lines.values()].map((place) =>
-      make("p", { class: "place", title: place.file }, `${place.file.split("/").pop()}:${place.line} `, place.text ? source(place.text, place.flags) : null, place.flag ? "" : " by default"),
+      make(
+        "p",
+        { class: "place", title: place.file },
+        `${place.file.split("/").pop()}:${place.line} `,
+        place.text ? source(place.text, place.flags) : null,
+        place.flag ? "" : " by default",
+      ),
     );
   }
 

@@ -52,6 +52,15 @@ dodo.dom = (function () {
     return element;
   }
 
+  const make = (tag, attributes, ...children) => filled(document.createElement(tag), attributes, children);
+
+  // A select of pairs of value and text; `change` gets the value that is chosen.
+  function choice(label, pairs, change) {
+    const element = make("select", { "aria-label": label }, ...pairs.map(([value, text]) => make("option", { value }, text)));
+    element.addEventListener("change", () => change(element.value));
+    return element;
+  }
+
   // Three digits, of whole numbers all of them.
   function number(value) {
     if (value === null || value === undefined || Number.isNaN(value)) return "none";
@@ -61,7 +70,8 @@ dodo.dom = (function () {
   }
 
   return {
-    make: (tag, attributes, ...children) => filled(document.createElement(tag), attributes, children),
+    make,
+    choice,
     svg: (tag, attributes, ...children) => filled(document.createElementNS(SVG, tag), attributes, children),
     number,
     seconds: (value) => `${value.toFixed(2)} s`,

@@ -3,7 +3,7 @@
 
 dodo.header = (function () {
   const { cursor } = dodo;
-  const { make, seconds } = dodo.dom;
+  const { choice, make, seconds } = dodo.dom;
   const { test, moment, files, spec } = dodo.data.test;
   const SLUG = /^[a-z0-9-]+$/;
   const failed = (window.dodoFailed || []).filter(([slug]) => SLUG.test(slug));
@@ -95,8 +95,8 @@ dodo.header = (function () {
     slider.addEventListener("input", () => cursor.move(Number(slider.value)));
     const mark = make("span", { class: `mark ${test.outcome}`, title: `Decided at ${seconds(moment.time)}: ${moment.what}` });
     mark.style.setProperty("--share", moment.time / cursor.last);
-    const speed = make("select", { "aria-label": "Speed" }, ...[0.1, 0.25, 0.5, 1, 2, 5].map((each) => make("option", { value: each, selected: each === 1 }, `${each}×`)));
-    speed.addEventListener("change", () => cursor.setSpeed(Number(speed.value)));
+    const speed = choice("Speed", [0.1, 0.25, 0.5, 1, 2, 5].map((each) => [each, `${each}×`]), (value) => cursor.setSpeed(Number(value)));
+    speed.value = 1;
     const time = make("output", {});
     const jump = { class: "jump", title: `${seconds(moment.time)}: ${moment.what} (D)`, onclick: () => cursor.move(moment.time) };
     parent.append(

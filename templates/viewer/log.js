@@ -2,7 +2,7 @@
 "use strict";
 
 dodo.log = (function () {
-  const { make } = dodo.dom;
+  const { choice, make } = dodo.dom;
   const { services, lines, left } = dodo.data.test.log;
   // What a choice hides: lines of the level "info" are those that DoDo's own services say in passing.
   const LEVELS = [["info", "Without DoDo's INFO"], ["", "All lines"], ["info,", "Warnings and errors"], ["info,,warning", "Errors"]];
@@ -43,12 +43,17 @@ dodo.log = (function () {
   function controls(list) {
     const search = make("input", { type: "search", placeholder: "Search", "aria-label": "Search the log" });
     search.addEventListener("input", () => ((shown.text = search.value.toLowerCase()), filter(list)));
-    const choice = make("select", { "aria-label": "Service" }, make("option", { value: "" }, "All services"), ...services.map((name) => make("option", {}, name)));
-    choice.addEventListener("change", () => ((shown.service = choice.value), filter(list)));
-    const count = (hidden) => lines.filter(([, , level]) => !hidden.includes(level)).length;
-    const level = make("select", { "aria-label": "Level" }, ...LEVELS.map(([hides, name]) => make("option", { value: hides }, `${name} (${count(hides ? hides.split(",") : [])})`)));
-    level.addEventListener("change", () => ((shown.hidden = level.value ? level.value.split(",") : []), filter(list)));
-    return [search, choice, level];
+    const service = choice("Service", [["", "All services"], ...services.map((name) => [name, name])], (name) => {
+      shown.service = name;
+      filter(list);
+    });
+    const hides = (value) => (value ? value.split(",") : []);
+    const count = (value) => lines.filter(([, , level]) => !hides(value).includes(level)).length;
+    const level = choice("Level", LEVELS.map(([value, name]) => [value, `${name} (${count(value)})`]), (value) => {
+      shown.hidden = hides(value);
+      filter(list);
+    });
+    return [search, service, level];
   }
 
   function show(parent) {

@@ -43,7 +43,8 @@ dodo.map = (function () {
 
   function trace({ poses }, until = Infinity) {
     const every = Math.ceil(poses.length / MOST);
-    return poses.filter((one, n) => one.time <= until && (n % every === 0 || n === poses.length - 1)).map(({ x, y }, n) => `${n ? "L" : "M"}${x} ${y}`).join("");
+    const kept = poses.filter((one, n) => one.time <= until && (n % every === 0 || n === poses.length - 1));
+    return kept.map(({ x, y }, n) => `${n ? "L" : "M"}${x} ${y}`).join("");
   }
 
   function vehicle(kind) {
@@ -68,7 +69,10 @@ dodo.map = (function () {
     }
     const now = svg("path", { class: "driven" });
     const own = vehicle("now");
-    const moving = bodies.map((body) => [body, painted(svg("path", { class: "body", d: closed(body.outline) }), "fill", body.colour), name(body.name, "other", 0, 0), svg("path", { class: "trail" })]);
+    const moving = bodies.map((body) => {
+      const shape = painted(svg("path", { class: "body", d: closed(body.outline) }), "fill", body.colour);
+      return [body, shape, name(body.name, "other", 0, 0), svg("path", { class: "trail" })];
+    });
     const parts = [...ground, svg("path", { class: "whole", d: trace(driven) }), now, ...moving.flatMap(([, shape, text, trail]) => [trail, shape, text])];
     const other = before.poses.length ? vehicle("before") : null;
     if (other) parts.push(svg("path", { class: "earlier", d: trace(before) }), other);

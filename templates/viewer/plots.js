@@ -21,7 +21,10 @@ dodo.plots = (function () {
     };
   }
 
-  const plain = (channel, field) => ({ title: field.title, unit: field.unit, times: channel.times, values: field.values, note: channel.every > 1 ? `one of ${channel.every} samples` : "" });
+  function plain(channel, field) {
+    const note = channel.every > 1 ? `one of ${channel.every} samples` : "";
+    return { title: field.title, unit: field.unit, times: channel.times, values: field.values, note };
+  }
 
   // Boxes of each frame by what became of them, one on top of the other.
   function detected() {
@@ -39,8 +42,10 @@ dodo.plots = (function () {
   const used = (fields) => (fields.length > 1 && fields.some((one) => one.values.some(Boolean)) ? fields.filter((one) => one.values.some(Boolean)) : fields);
 
   function judged() {
-    const channels = data.test.messages.flatMap((each) => data.channels.filter((c) => c.message === each.message && (each.sender === null || c.sender === each.sender)));
-    return [...data.test.judged.map(recorded), ...channels.flatMap((channel) => used(channel.fields).map((field) => plain(channel, field))), ...(data.frames.length ? [detected()] : [])];
+    const isOf = (channel, { message, sender }) => channel.message === message && (sender === null || channel.sender === sender);
+    const channels = data.test.messages.flatMap((each) => data.channels.filter((channel) => isOf(channel, each)));
+    const fields = channels.flatMap((channel) => used(channel.fields).map((field) => plain(channel, field)));
+    return [...data.test.judged.map(recorded), ...fields, ...(data.frames.length ? [detected()] : [])];
   }
 
   function heights(signal) {
@@ -122,9 +127,9 @@ dodo.plots = (function () {
   function wheel(u, event) {
     event.preventDefault();
     const wide = range[1] - range[0];
-    if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) return zoom(...range.map((edge) => edge + ((event.deltaX || event.deltaY) / 500) * wide));
-    const [at, factor] = [u.posToVal(event.offsetX, "x"), Math.exp(event.deltaY / 500)];
-    return zoom(at - (at - range[0]) * factor, at + (range[1] - at) * factor);
+    const [at, factor, way] = [u.posToVal(event.offsetX, "x"), Math.exp(event.deltaY / 500), (event.deltaX || event.deltaY) / 500];
+    if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) zoom(range[0] + way * wide, range[1] + way * wide);
+    else zoom(at - (at - range[0]) * factor, at + (range[1] - at) * factor);
   }
 
   // A chart in an element that fills it; `read` takes the time under the pointer, null where there is none.
@@ -132,14 +137,20 @@ dodo.plots = (function () {
     const look = { stroke: () => colour("soft"), grid: { stroke: () => colour("grid"), width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif" };
     const bars = uPlot.paths.bars({ size: [0.9, 40, 2] });
     const line = { stroke: () => colour("line"), width: 1.6, points: { show: false } };
-    const lines = signal.stacked ? KINDS.map(([kind]) => ({ stroke: () => colour(kind), fill: () => colour(kind), paths: bars, width: 0, points: { show: false } })) : [line];
+    const bar = ([kind]) => ({ stroke: () => colour(kind), fill: () => colour(kind), paths: bars, width: 0, points: { show: false } });
     const gaps = (values) => Array.from(values, (value) => (Number.isFinite(value) ? value : null));
     const [low, high] = heights(signal);
     const u = new uPlot(
       {
-        width: element.clientWidth || 300, height: element.clientHeight || 80, padding: signal.isAxis ? [0, RIGHT, 0, 0] : [6, RIGHT, 6, 0], legend: { show: false },
+        width: element.clientWidth || 300,
+        height: element.clientHeight || 80,
+        padding: signal.isAxis ? [0, RIGHT, 0, 0] : [6, RIGHT, 6, 0],
+        legend: { show: false },
         cursor: {
-          y: false, sync: { key: "time", setSeries: false }, drag: { x: true, y: false, dist: 4, setScale: false }, points: { show: !signal.isAxis && !signal.stacked },
+          y: false,
+          sync: { key: "time", setSeries: false },
+          drag: { x: true, y: false, dist: 4, setScale: false },
+          points: { show: !signal.isAxis && !signal.stacked },
           bind: {
             mousedown: (self, _, begin) => (event) => (event.shiftKey ? pan(self, event) : begin(event)),
             dblclick: () => () => zoom(0, cursor.last),
@@ -148,9 +159,16 @@ dodo.plots = (function () {
         scales: { x: { time: false, auto: false, range: () => range }, y: { auto: false, range: () => [low, high] } },
         axes: [
           { ...look, size: signal.isAxis ? 24 : 0, values: signal.isAxis ? (_, ticks) => ticks.map((each) => `${number(each)} s`) : () => [], space: 70 },
-          { ...look, size: AXIS, space: 26, ...(signal.stacked ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500] } : {}), values: (_, ticks) => (signal.isAxis ? [] : ticks.map(number)), grid: { ...look.grid, show: !signal.isAxis } },
+          {
+            ...look,
+            size: AXIS,
+            space: 26,
+            ...(signal.stacked ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500] } : {}),
+            values: (_, ticks) => (signal.isAxis ? [] : ticks.map(number)),
+            grid: { ...look.grid, show: !signal.isAxis },
+          },
         ],
-        series: [{}, ...lines],
+        series: [{}, ...(signal.stacked ? KINDS.map(bar) : [line])],
         hooks: {
           drawClear: [(self) => behind(self, signal)],
           draw: [(self) => marks(self, signal)],
@@ -225,7 +243,9 @@ dodo.plots = (function () {
     const plots = make("div", { class: "plots", tabindex: "0" });
     const axis = make("div", { class: "axis", role: "img", "aria-label": "Time of the test in seconds" });
     const pointed = make("output", { title: "Time under the pointer" });
-    parent.append(make("h2", {}, "Signals", chooser(plots), make("button", { title: "Wheel: zoom. Drag: zoom to a part. Shift and drag: pan. Double click: all", onclick: () => zoom(0, cursor.last) }, "Whole test"), pointed), plots, axis);
+    const keys = "Wheel: zoom. Drag: zoom to a part. Shift and drag: pan. Double click: all";
+    const whole = make("button", { title: keys, onclick: () => zoom(0, cursor.last) }, "Whole test");
+    parent.append(make("h2", {}, "Signals", chooser(plots), whole, pointed), plots, axis);
     if (data.test.why) plots.append(make("p", { class: "nothing" }, data.test.why));
     if (!list.length && !data.test.why) plots.append(make("p", { class: "nothing" }, "No signal that is judged was recorded."));
     for (const signal of list) add(plots, signal, false);

@@ -12,8 +12,7 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.outcome import Outcome, with_margin
 from dodo_dsl.report import results
 from dodo_dsl.report.files import SHARED, forget
-from dodo_dsl.report.next_report import Drawings
-from dodo_dsl.report.report_folder import Drawable, write_summaries
+from dodo_dsl.report.report_folder import Drawable, draw_test, write_summaries
 from dodo_dsl.report.viewer import page as viewer_page
 from tests.report.joined.reports import draw
 from tests.run.helpers import Bench
@@ -133,9 +132,9 @@ def test_what_cannot_be_drawn_is_said_and_half_a_page_is_none(tmp_path: Path, mo
         raise OSError("no room")
 
     monkeypatch.setattr(viewer_page, "write_html", refuse)
-    with Drawings(tmp_path) as drawings:
-        drawings.begin(OUTCOME, Drawable(Bench(tmp_path).plan(), tmp_path))
-    assert drawings.problems() == [f"the page of {OUTCOME.name} cannot be written: no room"]
+    assert draw_test(tmp_path, OUTCOME, Drawable(Bench(tmp_path).plan(), tmp_path)) == [
+        f"the page of {OUTCOME.name} cannot be written: no room"
+    ]
     write_summaries(tmp_path, [OUTCOME])
     assert "drive.html" not in (tmp_path / "index.html").read_text()
 
