@@ -277,15 +277,12 @@ def save_report(
     kept = {outcome.slug for outcome in (others.outcomes if others else ())}
     try:
         before = {slug: runs for slug, runs in overview.read_history(target.place).items() if slug in kept}
-        gone = target.take_place([outcome.slug for outcome in outcomes], kept)
+        target.take_place([outcome.slug for outcome in outcomes], kept)
         write_summaries(target.place, every, results.joined(reports), past={**before, **past})
     except Exception as error:  # noqa: BLE001  (the outcomes are printed)
         why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
-        target.stays = True
-        left = "" if target.folder == target.place else f"what it has until the next run is in {target.folder}\n"
-        return WrittenReport(f"'{shown}' cannot take the whole report: {why}\n{left}".rstrip("\n"), is_whole=False)
+        return WrittenReport(f"'{shown}' cannot take the whole report: {why}", is_whole=False)
     finally:
         history.save()
     beside = f", with {count(len(kept), 'test')} of earlier runs" if kept else ""
-    instead = f"; it replaces an earlier one with {count(gone, 'other test')}" if gone else ""
-    return WrittenReport(f"report: {shown / 'index.html'}{beside}{instead}", problems)
+    return WrittenReport(f"report: {shown / 'index.html'}{beside}", problems)

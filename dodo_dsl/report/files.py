@@ -33,11 +33,8 @@ def is_of_a_test(path: str) -> bool:
     return _COPIED.fullmatch(path) is not None
 
 
-def forget(folder: Path, slugs: Sequence[str], others: Collection[str] = ()) -> int:
-    """Removes the reports of an earlier run but for its tests ``others``, and those of ``slugs``; other files stay.
-
-    Returns how many tests of the earlier run are among neither.
-    """
+def forget(folder: Path, slugs: Sequence[str], others: Collection[str] = ()) -> None:
+    """Removes the reports of an earlier run but for its tests ``others``, and those of ``slugs``; other files stay."""
     try:
         earlier = [outcome.slug for outcome in results.load(folder)]
     except results.ResultsError:
@@ -45,7 +42,6 @@ def forget(folder: Path, slugs: Sequence[str], others: Collection[str] = ()) -> 
     for slug in {*slugs, *earlier} - {*others}:
         if SLUG.fullmatch(slug):
             _forget_test(folder / slug)
-    return len({*earlier} - {*slugs} - {*others})
 
 
 def _forget_test(place: Path) -> None:

@@ -23,20 +23,13 @@ class NextReport:
 
     place: Path
     folder: Path
-    stays: bool = False
-    """Whether the folder is left as it is."""
 
-    def take_place(self, slugs: Sequence[str], others: Collection[str] = ()) -> int:
-        """Replaces the tests of the report before but for ``others``; returns how many of them are gone.
-
-        Raises OSError.
-        """
-        if self.folder == self.place:
-            return 0
-        gone = forget(self.place, slugs, others)
-        for entry in sorted(self.folder.iterdir()):
-            _move(entry, self.place / entry.name)
-        return gone
+    def take_place(self, slugs: Sequence[str], others: Collection[str] = ()) -> None:
+        """Replaces the tests of the report before but for ``others``; raises OSError."""
+        if self.folder != self.place:
+            forget(self.place, slugs, others)
+            for entry in sorted(self.folder.iterdir()):
+                _move(entry, self.place / entry.name)
 
 
 @contextlib.contextmanager
@@ -54,15 +47,13 @@ def next_report(place: Path, slugs: Sequence[str] = (), in_place: bool = False) 
         in_place = True
     if in_place:
         forget(place, slugs)
-        yield NextReport(place, place, stays=True)
+        yield NextReport(place, place)
         return
-    report = NextReport(place, folder)
     with _locked(folder):
         try:
-            yield report
+            yield NextReport(place, folder)
         finally:
-            if not report.stays:
-                shutil.rmtree(folder, ignore_errors=True)
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _remove_left_behind(place: Path) -> None:

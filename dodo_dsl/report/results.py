@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import msgspec
 
@@ -129,14 +129,12 @@ def to_json(outcomes: Sequence[Outcome], circumstances: Circumstances = NO_CIRCU
     return json.dumps(document, indent=2, ensure_ascii=False).encode(errors="replace").decode() + "\n"
 
 
-@dataclass(frozen=True)
-class JoinedTest:
-    """A test with a slug and name that no other has, and where it comes from."""
+class JoinedTest(NamedTuple):
+    """A test with a slug and name that no other has, and where it comes from: a report, and its slug there."""
 
     outcome: Outcome
     report: GivenReport
     slug: str
-    """In the report that it comes from."""
 
 
 def distinct(reports: Sequence[GivenReport]) -> Iterator[JoinedTest]:

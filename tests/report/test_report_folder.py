@@ -68,7 +68,7 @@ def test_each_test_has_a_page(tmp_path: Path) -> None:
     assert draw(tmp_path / "report", outcomes, dict.fromkeys(("drive", "error"), Drawable(plan, tmp_path))) == []
     page = (tmp_path / "report" / "index.html").read_text()
     assert re.findall(r'href="(.*?drive.html)"', page) == ["drive/drive.html", "error/drive.html"]
-    assert forget(tmp_path / "report", ["drive", "error"]) == 0
+    forget(tmp_path / "report", ["drive", "error"])
     assert not list((tmp_path / "report").glob("*/drive.*"))
 
 
@@ -104,7 +104,7 @@ def test_forgetting_spares_what_is_not_a_report(tmp_path: Path) -> None:
     (tmp_path / "project" / "logs").mkdir()
     document = json.loads(results.to_json([replace(OUTCOME, slug="gone")]))
     (report / "results.json").write_text(json.dumps(document))
-    assert forget(report, ["test"]) == 1
+    forget(report, ["test"])
     assert sorted(p.name for p in report.iterdir()) == ["results.json", "test"]
     assert [p.name for p in (report / "test").iterdir()] == ["notes.txt"]
     assert (tmp_path / "project" / "logs").is_dir()
