@@ -61,7 +61,7 @@ dodo.header = (function () {
   }
 
   function links() {
-    const found = files.map((file) => make("a", { href: file, download: file }, file));
+    const found = files.filter((file) => /^[a-z]+\.rec$/.test(file)).map((file) => make("a", { href: file, download: file }, file));
     if (dodo.data.test.log.lines.length) found.push(make("a", { href: "logs/" }, "logs"));
     if (spec) found.push(opener("Spec", test.spec, dialog(test.spec, make("pre", { tabindex: "0" }, spec))));
     const mcap = `dodo rec export ${test.slug}/test.rec --mcap -o ${test.slug}.mcap`;
