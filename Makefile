@@ -52,9 +52,8 @@ quick-tests: dev
 	$(PYTEST) -n $(WORKERS) -m "not slow and not thorough and not proof" --hypothesis-profile=quick --junitxml=$(JUNIT)/quick.xml
 
 all-tests:
-	@rm -f $(JUNIT)/*.xml; status=0; \
-		$(PYTEST) -n $(ALL_WORKERS) --dist loadgroup --no-loadscope-reorder -m "not proof" --junitxml=$(JUNIT)/test.xml || status=$$?; \
-		.venv/bin/python scripts/slowest-tests $(JUNIT)/test.xml; exit $$status
+	@rm -f $(JUNIT)/*.xml
+	$(PYTEST) -n $(ALL_WORKERS) --dist loadgroup --no-loadscope-reorder -m "not proof" --durations=15 --junitxml=$(JUNIT)/test.xml
 
 tools:
 	@scripts/install-test-tools
@@ -75,9 +74,9 @@ test:
 
 proof: dev tools
 	@rm -f $(JUNIT)/proof.xml $(JUNIT)/search.xml; status=0; \
-		$(PYTEST) -m proof --session-timeout=$(PROOF_S) --junitxml=$(JUNIT)/proof.xml || status=$$?; \
+		$(PYTEST) -m proof --session-timeout=$(PROOF_S) --durations=15 --junitxml=$(JUNIT)/proof.xml || status=$$?; \
 		$(PYTEST) -n 2 -m "hypothesis and not engine and not realtime" --hypothesis-profile=search --junitxml=$(JUNIT)/search.xml || status=$$?; \
-		.venv/bin/python scripts/slowest-tests --held $(JUNIT)/proof.xml; exit $$status
+		exit $$status
 
 bench:
 	@since=$$(date +%s); scripts/install-bench-tools && .venv/bin/python -m benchmarks.ledger --since $$since $(BENCH)
