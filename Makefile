@@ -19,7 +19,7 @@ help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
 	@echo "make check    format, lint, types, imports, and the tests that need only Python: below a minute"
 	@echo "make test     set up, then every check and every test: eight minutes"
-	@echo "make proof    what takes long to prove, in half an hour at most, and what of it holds"
+	@echo "make proof    what takes long to prove, in half an hour at most"
 	@echo "make lint     format, lint, types, imports"
 	@echo "make bench    set up, then measure, beside a peer in the same run: ten minutes, a table in build/bench"
 	@echo "make firmware build the gantry's firmware and its emulated rig, into build/firmware"
