@@ -87,17 +87,6 @@ def test_the_example_application_is_within_the_limits_and_others_are_not(name):
         assert {"mean", "share"} & set(within(wrong, target, limits)) == set()
 
 
-@pytest.mark.parametrize("name", ["straight", "left-curve"])
-def test_the_beacon_moves_evenly_and_stays_in_the_lane(name):
-    way = rows(name)
-    times, places = np.array([r["time"] for r in way]), np.array([(r["x"], r["y"]) for r in way])
-    assert np.diff(times) == pytest.approx(np.full(len(way) - 1, 0.1))
-    assert np.linalg.norm(np.diff(places, axis=0), axis=1) == pytest.approx(np.full(len(way) - 1, 0.05), abs=1e-4)
-    content = json.loads((REGISTRY / "maps" / name / "map.json").read_text())
-    cones = np.array([i[:2] for model in content["model"][:2] for i in model["instances"]])
-    assert np.linalg.norm(places[:, None] - cones[None], axis=2).min() > 0.1
-
-
 def test_the_truth_holds_the_cones_of_the_picture():
     """Each true box is full of its colour where no other cone hides it, and no cone is outside of all."""
     truth = json.loads((REGISTRY / "truths" / "static-rig.json").read_text())
