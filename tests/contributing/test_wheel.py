@@ -1,4 +1,4 @@
-"""The wheel: the same bytes from the same sources, and enough in it to compile without the libraries of running."""
+"""The wheel: enough is in it to compile without the libraries of running."""
 
 import compileall
 import os
@@ -32,29 +32,17 @@ sys.exit(run())
 """
 
 
-def built(sources: Path, date: int, umask: int) -> Path:
-    """The wheel of a checkout of its own, whose files have this date and these permissions."""
-    skipped = shutil.ignore_patterns("__pycache__", "*.pyc")
-    before = os.umask(umask)
-    try:
-        for name in PARTS:
-            shutil.copytree(ROOT / name, sources / name, ignore=skipped, copy_function=shutil.copyfile)
-        for name in FILES:
-            shutil.copyfile(ROOT / name, sources / name)
-    finally:
-        os.umask(before)
-    for path in sources.rglob("*"):
-        os.utime(path, (date, date))
-    words = ("-m", "hatchling", "build", "--target", "wheel")
-    environment = {name: value for name, value in os.environ.items() if name != "SOURCE_DATE_EPOCH"}
-    subprocess.run([sys.executable, *words], cwd=sources, env=environment, check=True, capture_output=True)
-    (wheel,) = (sources / "dist").iterdir()
-    return wheel
-
-
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return built(tmp_path_factory.mktemp("first"), 1_500_000_000, 0o022)
+    sources, skipped = tmp_path_factory.mktemp("sources"), shutil.ignore_patterns("__pycache__", "*.pyc")
+    for name in PARTS:
+        shutil.copytree(ROOT / name, sources / name, ignore=skipped)
+    for name in FILES:
+        shutil.copyfile(ROOT / name, sources / name)
+    words = ("-m", "hatchling", "build", "--target", "wheel")
+    subprocess.run([sys.executable, *words], cwd=sources, check=True, capture_output=True)
+    (made,) = (sources / "dist").iterdir()
+    return made
 
 
 def test_tests_compile_without_the_libraries_of_running(wheel: Path, tmp_path: Path) -> None:
