@@ -67,7 +67,7 @@ dodo.camera = (function () {
     });
     chooser.hidden = videos.length < 2;
     const text = make("p", { class: "caption" });
-    const shown = make("div", { class: "screen" }, screen, over);
+    const shown = make("div", { class: "screen" }, video ? screen : "", over);
     shown.style.aspectRatio = `${WIDE} / ${high}`;
     shown.style.setProperty("--ratio", WIDE / high);
     parent.append(make("div", { class: "view" }, make("div", { class: "stage" }, shown), make("p", { class: "caption" }, why()), text, chooser));

@@ -19,7 +19,7 @@ from dodo_dsl.report import checks
 from dodo_dsl.report.trajectory import Way
 from dodo_dsl.report.viewer.encoded import packed, shown
 from dodo_dsl.report.viewer.recorded import MICROSECONDS, Values
-from dodo_dsl.report.viewer.units import UNITS
+from dodo_dsl.report.viewer.units import of_series
 
 _BOX = {"hit": 6, "false": 5, "missed": 5}
 """Kinds of boxes, and how many texts and numbers each has after its kind."""
@@ -52,8 +52,8 @@ class Line(msgspec.Struct):
 
     def about(self, evaluator: str) -> dict[str, Any]:
         """A plot without its samples."""
-        name = shown(self.series, 200)
-        unit = shown(self.unit, 40) or UNITS.get(name.partition(" ")[0], "")
+        name, known = of_series(shown(self.series, 200))
+        unit = shown(self.unit, 40) or known
         notes = [f"band ±{self.band:.4g}"] if self.band is not None else []
         notes += [checks.bound("min", self.low, unit, self.exclusive)] if self.low is not None else []
         notes += [checks.bound("max", self.high, unit, self.exclusive)] if self.high is not None else []

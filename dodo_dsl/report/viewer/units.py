@@ -31,3 +31,12 @@ def title(message: str, field: str, sender: int) -> str:
     name = message.rpartition(".")[2]
     stamp = f"/{sender}" if sender else ""
     return f"{_TITLES[message]}{stamp}" if message in _TITLES else f"{field} of {name}{stamp}"
+
+
+def of_series(name: str) -> tuple[str, str]:
+    """Title and unit of what an evaluator calls ``groundSteering of GroundSteeringRequest/0``; else its own name."""
+    field, _, message = name.partition(" of ")
+    short, _, sender = message.partition("/")
+    known = next((full for full in _TITLES if full.endswith(f".{short}")), "")
+    own = title(known, field, int(sender)) if known and sender.isascii() and sender.isdigit() else name
+    return own, UNITS.get(field, "")

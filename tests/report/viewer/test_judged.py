@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from dodo_dsl.report.trajectory import Way, ground_of
-from dodo_dsl.report.viewer import encoded, page
+from dodo_dsl.report.viewer import encoded, page, units
 from dodo_dsl.report.viewer import recorded as recorded_test
 from dodo_dsl.report.viewer.record import JudgedRecord, read
+from dodo_dsl.report.viewer.units import of_series
 from services.base import Judged, JudgedBoxes
 from services.base import judged as recording
 from tests.report.viewer import drives, failures
@@ -129,3 +130,10 @@ def test_the_path_is_that_of_one_sender(tmp_path: Path) -> None:
     test = recorded_test.read(tmp_path / "test.rec", drives.MESSAGES)
     for sender, x in ((3, 1.0), (0, 0.0), (7, 0.0)):
         assert page._path(test, sender)[:, 0].tolist() == [x] * 3
+
+
+def test_what_a_message_is_called_is_its_title() -> None:
+    assert of_series("groundSteering of GroundSteeringRequest/2") == ("Steering/2", "rad")
+    assert of_series("Distance to the walls") == ("Distance to the walls", "")
+    assert units.title("opendlv.sim.KinematicState", "vx", 0) == "vx of KinematicState"
+    assert units.unit("opendlv.sim.Frame", "x") == "m"
