@@ -12,7 +12,7 @@ from typing import Any
 from dodo_dsl.opendlv.channel import Done, Show
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.numbers import is_whole, whole
-from services.clock.exchange import SLICE_S, ApplicationFloods, ApplicationSilent, IsStopped, Patience, ServiceLink
+from services.clock.exchange import SLICE_S, ApplicationFloods, ApplicationSilent, Exchange, IsStopped, Patience
 
 MOST_SURPLUS = 100
 """Surplus messages of one kind to a frame; more of them are a flood that would keep others from the bus."""
@@ -142,7 +142,7 @@ def filters(names: Iterable[str], ids: Mapping[str, int]) -> tuple[MessageFilter
 class AnsweringApplication:
     """Shows pictures to the application and waits for its answers; ``frames`` counts what was shown."""
 
-    def __init__(self, answers: Answers, patience: Patience, link: ServiceLink, stopped: IsStopped) -> None:
+    def __init__(self, answers: Answers, patience: Patience, link: Exchange, stopped: IsStopped) -> None:
         self.answers = answers
         self.frames = 0
         self.waited_first, self.waited = 0.0, 0.0

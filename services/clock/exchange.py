@@ -9,7 +9,6 @@ from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Protocol
 
 from dodo_dsl.opendlv.address import LINES, Address
 from dodo_dsl.opendlv.address_book import RUNNER
@@ -160,15 +159,6 @@ class TimeOver(TestEnded):
     """The test time is over."""
 
     kind = "timedout"
-
-
-class ServiceLink(Protocol):
-    """Commands to the services and their results, as Exchange implements it."""
-
-    def send(self, service: str, command: Step | Show) -> None: ...
-    def result(self, service: str, timeout: float = 0.0) -> Done | None: ...
-    def pump(self, timeout: float, services: Collection[str] = ()) -> None: ...
-    def drain(self) -> None: ...
 
 
 IsStopped = Callable[[], bool]

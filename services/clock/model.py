@@ -2,10 +2,10 @@
 
 import time
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from dodo_dsl.opendlv.channel import Done, Step
 from dodo_dsl.opendlv.envelope import Envelope
@@ -13,31 +13,21 @@ from services.base.lockstep_clock import EPOCH
 from services.clock.exchange import (
     SLICE_S,
     ApplicationSilent,
+    Exchange,
     IsStopped,
     Roles,
-    ServiceLink,
     ServiceSilent,
     TimeOver,
 )
+
+if TYPE_CHECKING:
+    from services.clock.answers import AnsweringApplication
+    from services.clock.resting import RestingApplication
 
 SERVICE_PATIENCE = 60.0
 """Wall time in s that a service of the test has for a step; none takes nearly as long."""
 FIRST_TIMES = 4
 """How many times as long it has for its first one, as the clock begins while others still start: layer after layer."""
-
-
-class Application(Protocol):
-    """The application as RestingApplication and AnsweringApplication show it to a Stepper."""
-
-    frames: int
-    waited_first: float
-    waited: float
-
-    def start(self, now: int, cameras: Collection[str]) -> None: ...
-    def expect(self, now: int) -> None: ...
-    def show(self, shown: Sequence[Done], now: int) -> None: ...
-    def await_answer(self, until: int) -> None: ...
-    def collect(self) -> list[Envelope]: ...
 
 
 @dataclass
@@ -47,8 +37,8 @@ class Stepper:
     roles: Roles
     period: Fraction | int
     timeout: int
-    application: Application
-    link: ServiceLink
+    application: "AnsweringApplication | RestingApplication"
+    link: Exchange
     stopped: IsStopped
     now: int = EPOCH
     reached: int = EPOCH

@@ -6,7 +6,7 @@ from typing import Any
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.session import Session
 from services.base.runner import tell
-from services.clock.exchange import SLICE_S, ApplicationFloods, IsStopped, ServiceLink, ServiceSilent
+from services.clock.exchange import SLICE_S, ApplicationFloods, Exchange, IsStopped, ServiceSilent
 
 PATIENCE_S = 240.0
 """Wall time in s for the runner to read and match what is printed, which has its own limit."""
@@ -31,7 +31,7 @@ class PrintedLines:
         self._read = envelope
         return True
 
-    def are_complete(self, now: int, link: ServiceLink) -> bool:
+    def are_complete(self, now: int, link: Exchange) -> bool:
         """Take the messages of an application that rests, at a time of the test (us).
 
         False where it may have waited only for its lines to be read, or gets them itself. Raises ServiceSilent and

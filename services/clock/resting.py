@@ -20,9 +20,9 @@ from services.clock.exchange import (
     SLICE_S,
     ApplicationFloods,
     ApplicationSilent,
+    Exchange,
     IsStopped,
     Patience,
-    ServiceLink,
     ServiceSilent,
 )
 from services.clock.printed_lines import PrintedLines
@@ -158,7 +158,7 @@ class RestingApplication:
         answers: SentMessages,
         agent: TimeAgent,
         patience: Patience,
-        link: ServiceLink,
+        link: Exchange,
         stopped: IsStopped,
         response: ResponseTimes,
         names: Sequence[str] = (),

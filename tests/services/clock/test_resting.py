@@ -21,7 +21,7 @@ from services.base.lockstep_clock import EPOCH
 from services.clock import resting
 from services.clock.agent import TimeAgent
 from services.clock.answers import filters
-from services.clock.exchange import ApplicationSilent, Patience, ServiceLink, ServiceSilent
+from services.clock.exchange import ApplicationSilent, Exchange, Patience, ServiceSilent
 from services.clock.printed_lines import PrintedLines
 from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
 from tests.services.clock.toys import STEER, STEP, Toys
@@ -89,7 +89,7 @@ def application(agent: TimeAgent, sent: SentMessages | None = None, link: object
     heard = sent or SentMessages(filters([STEER], IDS))
     patience = Patience(0.4, 0.2)
     notes: list[str] = []
-    known = cast(ServiceLink, link or Link())
+    known = cast(Exchange, link or Link())
     made = RestingApplication(
         heard, agent, patience, known, lambda: False, ResponseTimes(), ("driver", "eye"), notes.append
     )
