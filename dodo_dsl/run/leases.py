@@ -26,7 +26,7 @@ CID, RUN, PROJECT = "cid-", "run-", "docker-"
 _LOCKS = Path("/run/lock")
 _MODE = 0o660
 _RETRY_S = 0.2
-_ENDING = ".lease"
+_ENDING, _LOCK = ".lease", "leases.lock"
 _MOST_BYTES = 1 << 16
 
 
@@ -45,7 +45,7 @@ class Lease:
 
     def release(self) -> None:
         """Gives up this process's hold, and leaves nothing to be removed."""
-        with contextlib.suppress(OSError):  # the next run removes the rest
+        with contextlib.suppress(OSError), _alone(self.record.parent):  # the next run removes the rest
             fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)  # nobody shares it
             self.record.unlink(missing_ok=True)
         os.close(self.descriptor)
@@ -69,27 +69,42 @@ def lease_folder() -> Path:
     return secured(above / own)
 
 
+@contextlib.contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Nobody else locks or removes a lease in the folder meanwhile; not to be nested."""
+    descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, _MODE)
+    try:
+        _share(descriptor, folder)
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _share(descriptor: int, folder: Path) -> None:
+    """All users of the folder can read and write a file, whatever the umask is."""
+    with contextlib.suppress(OSError):  # of another user, or of a group that this one is not in
+        os.fchmod(descriptor, _MODE)
+        os.fchown(descriptor, -1, folder.stat().st_gid)
+
+
 def _locked(path: Path, kind: int, *, is_made: bool) -> int | None:
     """The locked descriptor of a file that is there, or else made; None if it is held, or another user's alone."""
-    while True:
-        try:
-            flags = os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC | (os.O_CREAT if is_made else 0)
-            descriptor = os.open(path, flags, _MODE)
-        except PermissionError:
-            return None
-        status = os.fstat(descriptor)
-        if not stat.S_ISREG(status.st_mode):
-            os.close(descriptor)
-            raise OSError(errno.EINVAL, "expected a file", str(path))
-        try:
-            fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(descriptor)
-            return None
-        with contextlib.suppress(FileNotFoundError):
-            if os.path.samestat(status, path.stat()):  # its last holder has not removed it meanwhile
-                return descriptor
+    flags = os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC | (os.O_CREAT if is_made else 0)
+    try:
+        descriptor = os.open(path, flags, _MODE)
+    except PermissionError:
+        return None
+    try:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, "expected a file", str(path))  # noqa: TRY301
+        fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
+    except OSError as error:
         os.close(descriptor)
+        if isinstance(error, BlockingIOError):
+            return None
+        raise
+    return descriptor
 
 
 def _said(descriptor: int) -> dict[str, Any]:
@@ -103,14 +118,13 @@ def _said(descriptor: int) -> dict[str, Any]:
 def try_lease(name: str, about: dict[str, Any], shared: bool = False) -> Lease | None:
     """The lease when nobody has it, else None. Shared leases exclude only exclusive ones."""
     path = lease_folder() / f"{name}{_ENDING}"
-    descriptor = _locked(path, fcntl.LOCK_SH if shared else fcntl.LOCK_EX, is_made=True)
+    with _alone(path.parent):
+        descriptor = _locked(path, fcntl.LOCK_SH if shared else fcntl.LOCK_EX, is_made=True)
     if descriptor is None:
         return None
     lease = Lease(name, descriptor, path, _said(descriptor))
     try:
-        with contextlib.suppress(OSError):  # of another user, or of a group that this one is not in
-            os.fchmod(descriptor, _MODE)
-            os.fchown(descriptor, -1, path.parent.stat().st_gid)
+        _share(descriptor, path.parent)
         os.ftruncate(descriptor, 0)
         os.pwrite(descriptor, json.dumps({"pid": os.getpid(), **about}).encode(), 0)
     except OSError:
@@ -123,9 +137,10 @@ def holder(name: str) -> str:
     """The holder of a lease, for a message; empty if nobody holds it."""
     path = lease_folder() / f"{name}{_ENDING}"
     with contextlib.suppress(OSError):
-        if (descriptor := _locked(path, fcntl.LOCK_EX, is_made=False)) is not None:
-            os.close(descriptor)
-            return ""
+        with _alone(path.parent):
+            if (descriptor := _locked(path, fcntl.LOCK_EX, is_made=False)) is not None:
+                os.close(descriptor)
+                return ""
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
         about = _said(descriptor)
         os.close(descriptor)
@@ -163,7 +178,8 @@ def orphans(prefix: str) -> Iterator[Lease]:
     """This user's leases whose holders have ended and may have left something; each is yielded held."""
     for path in sorted(lease_folder().glob(f"{prefix}*{_ENDING}")):
         with contextlib.suppress(OSError):
-            descriptor = _locked(path, fcntl.LOCK_EX, is_made=False)
+            with _alone(path.parent):
+                descriptor = _locked(path, fcntl.LOCK_EX, is_made=False)
             if descriptor is not None and os.fstat(descriptor).st_uid == os.getuid():
                 yield Lease(path.name.removesuffix(_ENDING), descriptor, path, _said(descriptor))
             elif descriptor is not None:
