@@ -27,9 +27,8 @@ def test_both_sides_of_a_verdict(crate: Crate, tmp_path: Path, monkeypatch: pyte
     with EngineProxy(engine, certificates=certificates) as proxy, monkeypatch.context() as patch:
         for name, value in proxy.variables.items():
             patch.setenv(name, value)
-        (found, *rest) = capabilities.docker_engine()
+        (found,) = capabilities.docker_engine()
         assert (found.text.endswith(" with TLS"), proxy.variables["DOCKER_HOST"] in found.text) == (True, True)
-        assert [finding.state for finding in rest] == ["ok"], "the engine is on this machine"
         outcomes = crate.run(*jobs)
         assert crate.left() == []
     assert [outcomes[name].outcome for name in names] == ["passed", "failed"], outcomes
