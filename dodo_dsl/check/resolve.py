@@ -18,7 +18,7 @@ from dodo_dsl.opendlv import odvd
 from dodo_dsl.opendlv.assets import recording_contents
 from dodo_dsl.opendlv.odvd import STANDARD_0_9
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService, resolved
+from dodo_dsl.spec.arguments import FRAME, Argument, Known, ResolvedService, resolved
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Spec
@@ -182,10 +182,11 @@ def resolve(
     """Each instance resolved, in the order given."""
     declared = application.declared if application else None
     found: list[ResolvedTest] = []
+    known: Known = {}
     for spec in specs:
         rig = deployment.rig(spec.rig) or (emulated(spec.rig) if spec.rig in KIND_TAGS else None) if spec.rig else None
         services = tuple(
-            resolved(spec, use, manifest, rig)
+            resolved(spec, use, manifest, rig, known)
             for use in spec.uses
             if (manifest := manifests.get(use.uses.text)) is not None and use.layer in manifest.layers
         )

@@ -269,26 +269,36 @@ def written(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Entr
     return rig.entry(parameter.rig) if rig and parameter.rig else None
 
 
-def argument(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Argument:
-    """The argument of one parameter, the default included."""
-    entry = written(spec, use, parameter, rig)
+Known = dict[tuple[int, int, Path], Argument]
+"""Arguments of instances by the parameter, its entry (what they hold keeps both) and the registry."""
+
+
+def _argument(parameter: Parameter, entry: Entry | None, root: Path, known: Known) -> Argument:
+    """The argument of one parameter, the default included; instances share what they share in their spec."""
+    key = id(parameter), id(entry), root
+    if key not in known:
+        known[key] = _converted(parameter, entry, root)
+    return known[key]
+
+
+def _converted(parameter: Parameter, entry: Entry | None, root: Path) -> Argument:
     if entry is None:
         return Argument(parameter, None, default_value(parameter))
     if any(node.tag for node in walk(entry.value)):
         return Argument(parameter, entry)  # which is a problem of its own
     try:
-        return Argument(parameter, entry, convert(parameter, entry.value, spec.location.root))
+        return Argument(parameter, entry, convert(parameter, entry.value, root))
     except ValueProblem as problem:
         return Argument(parameter, entry, None, problem.diagnostic)
 
 
-def resolved(spec: Spec, use: Use, manifest: Manifest, rig: Rig | None) -> ResolvedService:
+def resolved(spec: Spec, use: Use, manifest: Manifest, rig: Rig | None, known: Known) -> ResolvedService:
     """A service with all its arguments; parameters without an effect beside others have no value."""
     arguments: dict[str, Argument] = {}
     texts: dict[str, str] = {}
     for name, parameter in sorted(manifest.parameters.items(), key=lambda item: bool(item[1].when)):
         has_effect = holds(parameter.when, texts)
-        found = argument(spec, use, parameter, rig)
+        found = _argument(parameter, written(spec, use, parameter, rig), spec.location.root, known)
         arguments[name] = found if has_effect else Argument(parameter, found.entry)
         if has_effect and found.value is not None:
             texts[name] = found.value.text

@@ -160,7 +160,7 @@ def snapshot(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec | None) -> 
 
 def _flags(rig: Rig, manifest: Manifest, spec: Spec | None, use: Use | None) -> tuple[Flag, ...]:
     if spec and use:
-        given = list(resolved(spec, use, manifest, rig).arguments.values())
+        given = list(resolved(spec, use, manifest, rig, {}).arguments.values())
     else:
         given = [_of_rig(rig, parameter) for parameter in manifest.parameters.values()]
     _refuse_invalid(given)
@@ -189,7 +189,7 @@ def _of_rig(rig: Rig, parameter: Parameter) -> Argument:
 def judged_classes(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec) -> list[str]:
     """The classes that a test evaluates; empty when it names none."""
     texts = (
-        resolved(spec, use, manifests[use.uses.text], rig).texts.get("classes", "")
+        resolved(spec, use, manifests[use.uses.text], rig, {}).texts.get("classes", "")
         for use in spec.uses
         if use.layer == "evaluation" and use.uses.text in manifests
     )
