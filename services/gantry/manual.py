@@ -42,7 +42,7 @@ CIRCLE_DISTANCES = {"x": 0.08, "y": 0.08, "yaw": math.radians(14.4)}
 """The same where the yaw turns without end: farther, as from index to index it takes longer than the others at home.
 Motors jump to a pole first; eight full steps are the same between poles."""
 SPEEDS = {"x": 0.1, "y": 0.1, "yaw": 0.35}
-"""Of homing (m/s, m/s, rad/s), as firmware/protocol.yml has them."""
+"""Of homing (m/s, m/s, rad/s), as firmware/gantry/protocol.h has them."""
 REPEATS = {"x": 0.005, "y": 0.005, "yaw": math.radians(2.5)}
 """By how much the switch may have moved (m, m, rad)."""
 DECIMAL = 1e-4
@@ -83,7 +83,6 @@ def run_checks(link: Link, limits: MotionLimits, kept: Mapping[str, float], pati
     A rig that cannot move, or still reports an old fault, is not fit.
     """
     status = start.find(link)
-    memory.read_memory(link)
     start.settle(link, status)
     memory.agree(link, kept, write=True)
     start.calibrate(link, patience)
@@ -226,7 +225,6 @@ def _done(
                 return {"ok": False, "reason": str(error)}, BROKEN
             return {"ok": True, **_where(link, limits)}, DONE
         status = start.find(link)
-        memory.read_memory(link)
         calibrates = action == "calibrate" or bool(emulated and goal)
         if action != "status":
             memory.agree(link, kept, write=calibrates, widen=action == "calibrate")

@@ -68,7 +68,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a line was not obeyed, as firmware/protocol.yml numbers it."""
+    """Why a line was not obeyed, as rig_table numbers it."""
 
     code: int
 

@@ -178,7 +178,6 @@ def build(context: Context) -> Service:
     context.resources.callback(link.close)
     with interruptible():
         status = start.find(link)
-        memory.read_memory(link)
         start.settle(link, status)
         calibrates = bool(flags["calibrate"] or emulated)
         memory.agree(link, kept_limits(flags), write=calibrates)
