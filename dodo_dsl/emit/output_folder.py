@@ -112,9 +112,9 @@ def _is_written(path: Path, entry: str | Path | _Link) -> bool:
 
 def _surplus(folder: Path, wanted: _Entries) -> list[str]:
     """What earlier compilations put into a folder, and this one does not."""
-    found = (folder if folder.name == SHARED else folder / FILES).rglob("*")
-    names = (path.relative_to(folder).as_posix() for path in sorted(found) if path.is_symlink() or path.is_file())
-    return [name for name in names if name not in wanted]
+    found = [path for path in sorted(folder.rglob("*")) if path.is_symlink() or path.is_file()]
+    names = (path.relative_to(folder).as_posix() for path in found)
+    return [n for n in names if n not in wanted and (folder.name == SHARED or n.partition("/")[0] == FILES)]
 
 
 def _open_to_containers(folder: Path) -> None:

@@ -42,7 +42,11 @@ def test_compiling_follows_no_symlink(tmp_path: Path, monkeypatch: pytest.Monkey
     place.parent.mkdir(parents=True)
     place.symlink_to(tmp_path / "theirs")
     code, output = dodo("compile", "sil-closed-straight")
-    assert (code, said in output) == (2, True), output
+    assert (code, said in output, place.is_symlink()) == (2, True, True), output
+    if link:
+        (tmp_path / "generated/sil-closed-straight/test.json").write_text('{"dodo": "plan"}')
+        assert dodo("compile", "sil-closed-straight")[0] == 0
+        assert place.is_dir() and not place.is_symlink(), "the whole folder is another one"
     assert [path.name for path in (tmp_path / "theirs").iterdir()] == ["precious"]
 
 
