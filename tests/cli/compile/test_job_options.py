@@ -77,7 +77,7 @@ def test_images_that_were_built_reach_each_test(repository: Path) -> None:
         lines = (repository / "generated/example/.env").read_text().splitlines()
         assert lines[-1] == image and lines.count(image) == 1
     made = pipeline((repository / "generated/child.gitlab-ci.yml").read_text())
-    assert " --backend docker " in made["example"]["script"][0]
+    assert " --backend docker " in made["example"]["script"][1]
     (repository / "images.env").write_text("")
     assert run("compile", "--images", "images.env")[0] == 0
     assert "DODO_IMAGE" not in (repository / "generated/example/.env").read_text()
