@@ -15,12 +15,6 @@ from dodo_dsl.plan.plan_json import json_text, to_json
 
 CHILD = "child.gitlab-ci.yml"
 PLAN_FILE = "test.json"
-_CHANGED = "Written by dodo compile; changes here are lost."
-_NOTES = f"""\
-# 'sandbox' holds the shared memory of all services. DODO_SUBNET is another subnet where this one is taken.
-# Services wait for those of the layers before them, and are ready when their link is in dodo-channel.
-# docker compose cp {RECORDER}:{compose.REPORT} . gets the recording.
-"""
 
 
 @dataclass(frozen=True)
@@ -39,33 +33,23 @@ def render_plan(plan: Plan) -> list[File]:
 def _files(plan: Plan) -> Iterator[tuple[str, str]]:
     names = [f"{layer}.compose.yml" for layer in LAYERS]
     for layer, name in zip(LAYERS, names, strict=True):
-        head = f"# Layer {layer} of test {plan.slug}: {plan.spec}\n# {_CHANGED}"
-        if layer == "application":
-            changes = "".join(f"#   {change}\n" for change in plan.application.changes)
-            content = yaml.text(compose.application(plan.application.compose))
-            yield name, f"{head} Made of the application's compose file:\n{changes}{content}"
-        else:
-            notes = _NOTES if layer == LAYERS[0] else ""
-            yield name, f"{head}\n{notes}{yaml.text(compose.layer(plan, layer))}"
+        is_own = layer == "application"
+        document = compose.application(plan.application.compose) if is_own else compose.layer(plan, layer)
+        about = {"first": LAYERS[0], "recorder": RECORDER, "report": compose.REPORT}
+        yield name, _filled("layer.compose.yml.j2", plan=plan, layer=layer, document=document, **about)
     judges = [service.name for service in plan.services if service.judge]
-    only = f" --exit-code-from {judges[0]}" if len(judges) == 1 else ""
-    listed = "".join(f"      - {name}\n" for name in names)
-    yield (
-        "compose.yaml",
-        f"# Test {plan.slug}: {plan.spec}\n# {_CHANGED}\n#\n"
-        f"#   docker compose up{only}\n"
-        f"#       runs the test; the verdict is a line of JSON of {', '.join(judges)}\n"
-        "#   docker compose down --volumes\n#       removes it\n"
-        f"name: dodo-{plan.slug}\ninclude:\n  - path:\n{listed}",
-    )
+    yield "compose.yaml", _filled("compose.yaml.j2", plan=plan, judges=judges, names=names)
     variables = {"PATH_SEPARATOR": ":", "FILE": ":".join(names), "PROJECT_NAME": f"dodo-{plan.slug}"}
     yield ".env", "".join(f"COMPOSE_{name}={value}\n" for name, value in variables.items())
     yield PLAN_FILE, to_json(plan)
 
 
 def render_pipeline(child: Pipeline) -> File:
-    template = _templates().get_template("child.gitlab-ci.yml.j2")
-    return File(CHILD, template.render(pipeline=child, spare_minutes=SPARE_MINUTES))
+    return File(CHILD, _filled("child.gitlab-ci.yml.j2", pipeline=child, spare_minutes=SPARE_MINUTES))
+
+
+def _filled(name: str, **values: object) -> str:
+    return _templates().get_template(name).render(**values)
 
 
 @functools.cache
@@ -76,5 +60,5 @@ def _templates() -> jinja2.Environment:
         autoescape=False,  # noqa: S701  (YAML, every value of an author goes through a filter)
         keep_trailing_newline=True,
     )
-    environment.filters.update(yaml=json_text, plain=yaml.flow)
+    environment.filters.update(yaml=json_text, plain=yaml.flow, compose=yaml.text)
     return environment
