@@ -74,7 +74,7 @@ def write_summaries(
 def _files(folder: Path, outcome: Outcome) -> LinkedFiles:
     """What there is of a test, the most informative picture first: it stands beside the test, also in GitLab."""
     place, camera = folder / outcome.slug, f"What the camera of {outcome.name} saw"
-    known = [(TRAJECTORY, f"The drive of {outcome.name} from above"), (FRAME, camera), (SNAPSHOT, camera)]
+    known = [(TRAJECTORY, f"The drive of {outcome.name} from above"), (SNAPSHOT, camera), (FRAME, camera)]
     known = known[1:] + known[:1] if outcome.kind == "perception" or outcome.level == "dil" else known
     spec = Path.cwd() / outcome.spec[:_LONGEST_PATH]
     is_spec = spec.name.endswith(SUFFIX) and spec.is_file()

@@ -118,7 +118,7 @@ def starts_with_all_it_needs(image: str, manifest: Manifest) -> None:
     about = yaml.safe_load((manifest.folder / "service.yml").read_text())
     if "example" not in about or manifest.devices == ("{serial}",):  # which needs a rig, or the clock of a test
         out = docker("run", "--rm", "--network", "none", *HARDENED, image, "--help")
-        assert out.startswith(f"{manifest.name}: {manifest.description}")
+        assert manifest.description in " ".join(out.split())
         return
     files = ("--volume", f"{ROOT / 'tests_registry'}:/opt/dodo/tests_registry:ro")
     words = (manifest.name, "--cid=131", *about["example"])

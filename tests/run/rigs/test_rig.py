@@ -33,15 +33,6 @@ def test_a_hil_test_on_a_real_rig(place: Place) -> None:
     assert len([envelope for envelope in recording if envelope.data_type == alive]) >= 3
 
 
-def test_a_tuned_rig_is_checked_and_calibrated_once(place: Place) -> None:
-    words = ("tune", "hil-fake", *APPLICATION, "--runs", "1", "--metres", "20")
-    out = place.dodo(*words, code=0)
-    assert "on rig fake: at most 30 min, and 20 m of driving" in out and "2 of 2 drives" in out
-    received = [word for word, _ in place.rig.received]
-    assert "CALIBRATE" in received and "CALIBRATE" not in received[received.index("RUN") :]
-    assert place.rig.last() == "STOP"
-
-
 def drive(place: Place) -> "subprocess.Popen[bytes]":
     """A run whose vehicle moves the rig by now."""
     run = place.start("run", "hil-fake", *APPLICATION, "--backend", "process")
