@@ -111,6 +111,7 @@ def test_what_says_nothing_about_the_rig_does_not_quarantine_it(place: Place) ->
     assert not list((place.folder / "state").glob("*"))
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # docker's, of a socket that refuses
 def test_unplugged_in_mid_test_and_then_quarantined(place: Place) -> None:
     over = threading.Event()
 
