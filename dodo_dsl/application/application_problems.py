@@ -22,6 +22,7 @@ from dodo_dsl.application.model import (
     ApplicationSource,
     ComposeService,
     declared_cid,
+    image_variable,
     plain,
     references,
     words_of,
@@ -55,6 +56,7 @@ def application_problems(
         found.extend([stack.problem(application, name, part, has_errors(own))] if part else own)
     found.extend(construction.check())
     found.extend(_cycles(application))
+    found.extend(_same_variable(application))
     found.extend(_several_cids(application, of_stack))
     yield from found
     if not has_errors(found):
@@ -73,6 +75,15 @@ def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
         message = f"services depend on one another: {', '.join([first, *others[:5]])}{more}"
         hint = "remove one of the dependencies, so that one service can start first"
         yield _bad(services[first].span, message, hint)
+
+
+def _same_variable(application: ApplicationSource) -> Iterator[Diagnostic]:
+    seen: dict[str, str] = {}
+    for name in application.services:
+        other = seen.setdefault(image_variable(name), name)
+        if other != name:
+            message = f"'{name}' and '{other}' would both take their image from {image_variable(name)}"
+            yield Diagnostic(application.services[name].span, "application-file", message, "rename one of them")
 
 
 def _several_cids(application: ApplicationSource, of_stack: Collection[str]) -> Iterator[Diagnostic]:

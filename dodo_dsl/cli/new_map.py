@@ -20,6 +20,8 @@ Pose = tuple[float, float, float]
 LANE = 0.5
 _MOST = 1000
 SPACING = 0.25
+_TURN_BACK = 1e-6
+"""Radians that a corner is short of a turn on the spot."""
 BEHIND, BEYOND = 0.3, 1.0
 BESIDE = 0.08
 LEAD, BACK = 0.8, 0.3
@@ -115,8 +117,8 @@ def _quantity(option: str, text: str, unit: str) -> float:
 def _points(path: Path) -> list[Point]:
     """The points of a CSV file, but those that are nearer than cones are to one another."""
     found: list[Point] = []
-    with path.open(newline="", encoding="utf-8") as file:
-        for number, row in enumerate(csv.reader(file), 1):
+    with path.open(newline="", encoding="utf-8", errors="replace") as file:
+        for number, row in enumerate(csv.reader(line.replace("\0", "?") for line in file), 1):
             try:
                 x, y = map(float, row)
             except ValueError:
@@ -138,6 +140,8 @@ def _through(points: Sequence[Point]) -> Track:
     sections = [Section(edges[0][0] / 2)]
     for (before, old), (after, new) in pairwise(edges):
         turn, room = math.remainder(new - old, math.tau), min(before, after) / 2
+        if abs(turn) > math.pi - _TURN_BACK:
+            raise UsageError("--line: the points turn back on themselves, expected a line that can be driven")
         radius = room / math.tan(abs(turn) / 2) if turn else 0.0
         arc = Section(radius * abs(turn), turn) if turn else Section(2 * room)
         sections += [

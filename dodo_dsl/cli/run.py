@@ -193,7 +193,7 @@ def _main(options: argparse.Namespace, stdout: TextIO) -> int:
         gc.enable()
         with reserved(options.report, stdout):
             source, said = origin(options, deployment), options.verbosity
-            is_part = bool(options.test or options.level or options.compiled)
+            is_part = bool(options.test or options.level or options.compiled or options.shard != (1, 1))
             others = run_report.earlier(options.report, [job.plan.name for job in jobs]) if is_part else None
             outcomes, is_reported, repeats = run(runner, jobs, options.report, stdout, source, others, said)
         if runner.kept:

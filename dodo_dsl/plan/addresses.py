@@ -26,12 +26,18 @@ def of_tests(tests: Sequence[ResolvedTest], deployment: Deployment, application:
 
 
 def cids(isolations: Sequence[str], available: Sequence[int]) -> list[int]:
-    """A CID for each test: unique while the range lasts, beyond it for those on the host network, which come first."""
-    order = list(range(len(isolations)))
-    if len(order) > len(available):
-        order.sort(key=lambda index: isolations[index] != "host")
-    given = {index: available[number % len(available)] for number, index in enumerate(order)}
-    return [given[index] for index in range(len(isolations))]
+    """A CID for each test: unique while the range lasts, beyond it only tests on their own network share one.
+
+    Tests on the host network come first; they share, too, when they alone are more than the range.
+    """
+    if len(isolations) <= len(available):
+        return list(available[: len(isolations)])
+    on_host = [i for i, isolation in enumerate(isolations) if isolation == "host"]
+    given = dict(zip(on_host, available, strict=False))
+    shared = available[len(on_host) :] or available
+    rest = (i for i in range(len(isolations)) if i not in given)
+    given.update((index, shared[n % len(shared)]) for n, index in enumerate(rest))
+    return [given[i] for i in range(len(isolations))]
 
 
 def subnets(network: ipaddress.IPv4Network, length: int = SMALLEST) -> list[str]:

@@ -158,12 +158,14 @@ async def lease_any(
 ) -> Lease:
     """The first of the leases that is free, which ``attempt`` takes; ``waiting`` gets a sentence if none is.
 
-    Raises LeaseTimeout after ``patience_s``. Times are of the event loop's clock, in s.
+    Raises LeaseTimeout when one holder has kept it for ``patience_s``. Times are of the event loop's clock, in s.
     """
     now = asyncio.get_running_loop().time
-    deadline, is_told = now() + patience_s, False
+    deadline, held_by, is_told = now() + patience_s, "", False
     while (lease := next((found for name in names if (found := attempt(name, about, shared))), None)) is None:
         holds = holder(names[0]) or "another process"
+        if holds != held_by:
+            deadline, held_by = now() + patience_s, holds
         if now() > deadline:
             kind = names[0].partition("-")[0]
             raise LeaseTimeout(f"no {kind} came free within {patience_s:g} s; {holds} holds one")

@@ -16,8 +16,6 @@ CIRCLE = "circle"
 """The kind of a rig whose yaw turns without end. Such a rig alone has its kind under this key, too, for a flag."""
 MEMORY = "memory"
 """The key of a flag for all limits of a rig, as its own memory keeps them: ``x=1.5,speed=0.4``, in m, rad and s."""
-MEMORY_FLAG = "limits"
-"""That flag of the gantry."""
 LIMIT_UNITS = {
     "x": "m",
     "y": "m",

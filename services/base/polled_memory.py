@@ -30,7 +30,7 @@ class PolledMemory:
         self.name, self.last = name, 0
         self._patience, self._attach, self._is_first_taken = patience, attach or SharedMemory.attach, is_first_taken
         self._memory: SharedMemory | None = None
-        self._retry = 0
+        self._retry, self._is_known = 0, False
 
     @property
     def size(self) -> int:
@@ -42,11 +42,11 @@ class PolledMemory:
         if self._memory is None and now < self._retry:
             return None
         try:
-            is_first = self._memory is None
             memory = self._memory = self._memory or self._attach(self.name)
             with memory.lock(self._patience):
                 time = memory.sample_time()
-                if is_first:
+                if not self._is_known:
+                    self._is_known = True
                     self.pass_over(0 if self._is_first_taken else time)
                 return take(memory, time)
         except SharedMemoryError as error:
@@ -70,4 +70,4 @@ class PolledMemory:
         """Detach from the memory."""
         if self._memory is not None:
             self._memory.close()
-            self._memory = None
+            self._memory, self._is_known = None, False

@@ -363,6 +363,7 @@ class Score:
             "mean-iou": total.mean_overlap,
             "frames": self.frames,
         }
+        gap = Check.most("gap", self.gap.length if self.gap else None, limits.gap, "s")
         silent = Check.most("unanswered", self.unanswered.share, limits.unanswered)
         left_out = {"without-truth": self.without_truth, "late": self.late, "repeated": self.repeated}
         return (
@@ -370,7 +371,7 @@ class Score:
             *(Check(name, value) for name, value in counts.items()),
             Check.least("answered", self.answered, limits.frames, parameters=("min-frames",)),
             silent if self.unanswered.frames else replace(silent, ok=True),  # no answer was expected
-            Check.most("gap", self.gap.length if self.gap else 0.0, limits.gap, "s"),
+            gap if self.gap else replace(gap, ok=True),
             *(Check(name, value) for name, value in left_out.items()),
             *self._classes(limits),
         )

@@ -59,6 +59,7 @@ def test_a_residual_within_the_tolerance_is_accepted() -> None:
     [
         (readings(3320, 2988, (0, 0.05, 0.1, 0.15)), "span 150.00 mm, expected at least 300.00 mm"),
         (readings(-3320, 2988), "is the sign of the readings wrong"),
+        ([*[Reading(5000.0, 0.6)] * 3, Reading(3000.0, 0.0)], "fewer than 4 different places"),
     ],
 )
 def test_readings_that_cannot_tell(found: list[Reading], said: str) -> None:

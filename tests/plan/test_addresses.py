@@ -21,6 +21,7 @@ SMALL = ipaddress.IPv4Network("10.213.0.0/24")
 def test_in_order_and_without_the_habitual_ones() -> None:
     assert cids(["network"] * 3, RANGE) == [128, 129, 130]
     assert cids(["network"] * 127, RANGE) == list(range(128, 255))
+    assert cids(["host", *["network"] * 3], [128, 129, 130]) == [128, 129, 130, 129]
 
 
 @given(st.lists(st.sampled_from(["network", "host"]), min_size=1, max_size=400))

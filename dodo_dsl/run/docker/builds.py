@@ -104,7 +104,8 @@ class _Contexts:
 
 
 def _is_odd(path: Path) -> bool:
-    return not (path.is_symlink() or path.is_dir() or path.is_file())
+    """Neither a link nor a file, nor a folder that can be read."""
+    return not (path.is_symlink() or path.is_file() or (path.is_dir() and os.access(path, os.R_OK | os.X_OK)))
 
 
 def _link(source: str, target: str) -> None:

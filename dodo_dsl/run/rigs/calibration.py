@@ -86,6 +86,8 @@ def fit(axis: Axis, readings: Sequence[Reading]) -> AxisLine:
     if (spread := np.ptp(places)) < axis.span:
         text = f"the readings of {axis.name} span {axis.shown(spread)}, expected at least {axis.shown(axis.span)}"
         raise CalibrationProblem(text)
+    if len({*steps}) < FEWEST:
+        raise CalibrationProblem(f"the readings of {axis.name} are at fewer than {FEWEST} different places")
     line, leverage = _turn(steps, places) if axis.circle else _straight(steps, places)
     if np.abs(line.residuals).max() > axis.tolerance:
         index = int((np.square(line.residuals) / (1 - leverage)).argmax())  # without it the others fit best

@@ -1,6 +1,6 @@
 /* dodo-time: decides which thread of the application runs next, and lets test time go on when all of them sleep.
  *
- * The clock of the test (services/clock/virtual.py) says over FIFOs how far time may go; docs/explanation/lockstep.md
+ * The clock of the test (services/clock/resting.py) says over FIFOs how far time may go; docs/explanation/lockstep.md
  * has the whole. Nothing that the application writes into the page is trusted: it can only make itself wait.
  */
 #define _GNU_SOURCE

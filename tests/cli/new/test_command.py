@@ -403,6 +403,19 @@ def test_a_pipeline_that_is_there_is_told_what_to_add(repository: Path, stages: 
     assert (repository / ".gitlab-ci.yml").read_text() == own
 
 
+@pytest.mark.parametrize("text", [b"0,0\n20,0\n0,0\n", b"0,0\n\xff,1\n", b"0,0\n1\x00,1\n"])
+def test_points_that_make_no_track(repository: Path, text: bytes) -> None:
+    (repository / "points.csv").write_bytes(text)
+    code, _, err = dodo("new", "--map", "track", "--line", "points.csv")
+    assert (code, err.startswith("dodo new: ")) == (2, True)
+
+
+@pytest.mark.thorough
+def test_a_long_name_is_apart_from_its_comment(repository: Path) -> None:
+    assert dodo("new", "sil-" + "a" * 40)[0] == 0
+    assert dodo("compile", "--check") == FINE
+
+
 LINES = {
     "parts": "straight 1 m, left 45 deg radius 1 m, right 45 deg radius 80 cm",
     "points": "points.csv",
