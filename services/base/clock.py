@@ -2,6 +2,7 @@
 
 import logging
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -20,7 +21,7 @@ _MAX_DRAINED = 1000
 _log = logging.getLogger(__name__)
 
 
-class Clock:
+class Clock(ABC):
     """Test time, in microseconds since the epoch.
 
     ``relays``: messages come from the clock, not from the bus, and are sent at the test's time.
@@ -33,28 +34,28 @@ class Clock:
         """Whether there is a picture that is not announced yet."""
         return False
 
+    @abstractmethod
     def now(self) -> int:
         """The time of the test."""
-        raise NotImplementedError
 
+    @abstractmethod
     def steps(self, period: Fraction | int, inbox: "Loop", stopped: Callable[[], bool]) -> Iterator[int]:
         """The instants at which a service is due, one each ``period`` microseconds; messages come in between.
 
         Ends soon after ``stopped``, which a message or a signal can make true.
         """
-        raise NotImplementedError
 
-    def sent(self, envelope: Envelope) -> None:
+    def sent(self, envelope: Envelope) -> None:  # noqa: B027  (most clocks have nothing to do)
         """The service has sent this message."""
 
-    def expect(self, time: int) -> None:
+    def expect(self, time: int) -> None:  # noqa: B027  (most clocks have nothing to do)
         """The service will show its next picture at this time (us) and none before; 0 when it does not know."""
 
+    @abstractmethod
     def memory(self, name: str, size: int) -> SharedMemory:
         """New shared memory for pictures that are sampled by this clock; raises SharedMemoryError."""
-        raise NotImplementedError
 
-    def close(self, stopped: Callable[[], bool]) -> None:
+    def close(self, stopped: Callable[[], bool]) -> None:  # noqa: B027  (most clocks have nothing to do)
         """The service ends; its last pictures can be read until ``stopped``."""
 
 
