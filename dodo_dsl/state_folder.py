@@ -29,6 +29,14 @@ def state_path(variable: str, name: str) -> Path:
         raise NoStateFolder(f"user {os.getuid()} has no home folder: set {variable} or XDG_STATE_HOME") from None
 
 
+def account_path(name: str) -> Path:
+    """``name`` in the state folder of this user's account, whatever variables say; raises NoStateFolder."""
+    try:
+        return Path(pwd.getpwuid(os.getuid()).pw_dir) / ".local" / "state" / "dodo" / name
+    except KeyError:
+        raise NoStateFolder(f"user {os.getuid()} has no account with a home folder") from None
+
+
 def shared_path(name: str) -> Path | None:
     """``name`` in the folder that root made for all users of this computer, whatever variables say; None without."""
     return path if (path := SHARED / name).is_dir() else None

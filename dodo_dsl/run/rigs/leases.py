@@ -21,12 +21,14 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.spec.rig import EMULATED
-from dodo_dsl.state_folder import NoStateFolder, secured, shared_path, state_path
+from dodo_dsl.state_folder import NoStateFolder, account_path, secured, shared_path, state_path
 
 DEVICE_FLAGS = ("--serial", "--source")
 """Flags of programs and services that name hardware."""
 FOLDER_VARIABLE = "DODO_RIGS"
 _NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
+_SOFTWARE = {1, 5, *range(136, 144)}
+"""The kernel's numbers of memory devices, consoles and pseudo terminals (Documentation/admin-guide/devices.txt)."""
 
 
 def identity(device: str) -> str:
@@ -40,6 +42,15 @@ def identity(device: str) -> str:
         if not stat.S_ISCHR(Path(path).stat().st_mode):
             return ""
     return path
+
+
+def is_hardware_device(device: str) -> bool:
+    """Whether a name means a device of hardware that is there: no pseudo terminal, file or device of memory."""
+    try:
+        status = Path(device).stat()
+    except (OSError, ValueError):
+        return False
+    return stat.S_ISCHR(status.st_mode) and os.major(status.st_rdev) not in _SOFTWARE
 
 
 def device_keys(devices: Iterable[str]) -> list[str]:
@@ -83,10 +94,14 @@ async def leased(
         yield tuple(descriptors)
 
 
-def quarantine_folder() -> Path:
-    """Where quarantines are: for all users, else in ``DODO_RIGS``, else in this user's state; raises RigProblem."""
+def quarantine_folder(is_hardware: bool = False) -> Path:
+    """Where quarantines are: for all users, else in ``DODO_RIGS``, else in this user's state; raises RigProblem.
+
+    Variables do not count for hardware, as a job could set them.
+    """
     try:
-        return shared_path("rigs") or state_path(FOLDER_VARIABLE, "rigs")
+        own = shared_path("rigs")
+        return own or (account_path("rigs") if is_hardware else state_path(FOLDER_VARIABLE, "rigs"))
     except NoStateFolder as error:
         raise RigProblem(f"quarantines cannot be kept: {error}") from error
 
@@ -95,7 +110,8 @@ def _files(rig: str, devices: Sequence[str]) -> list[Path]:
     """The file of the rig's name, and of each device."""
     if not _NAME.fullmatch(rig):
         raise RigProblem(f"'{rig}' is not a rig's name, expected lower-case letters, digits and hyphens")
-    return [quarantine_folder() / f"{key}.json" for key in (rig, *device_keys(devices))]
+    place = quarantine_folder(any(map(is_hardware_device, devices)))
+    return [place / f"{key}.json" for key in (rig, *device_keys(devices))]
 
 
 def quarantined(rig: str, devices: Sequence[str] = ()) -> str:
@@ -106,7 +122,10 @@ def quarantined(rig: str, devices: Sequence[str] = ()) -> str:
 
 def all_quarantined() -> dict[str, str]:
     """The rigs in quarantine, each with its reason; raises RigProblem."""
-    paths = sorted(quarantine_folder().glob("*.json"))
+    places = {quarantine_folder()}
+    with contextlib.suppress(RigProblem):  # a user without an account has no hardware in quarantine
+        places.add(quarantine_folder(is_hardware=True))
+    paths = (path for place in sorted(places) for path in sorted(place.glob("*.json")))
     return dict(_read(path) for path in paths if _NAME.fullmatch(path.stem))
 
 

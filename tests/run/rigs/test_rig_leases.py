@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.run import leases
+from dodo_dsl.run.rigs import leases as rig_leases
 from dodo_dsl.run.rigs.leases import (
     all_quarantined,
     clear_quarantine,
@@ -90,6 +91,20 @@ def test_a_busy_device_gives_the_cid_back(folder: Path) -> None:
 def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("DODO_RIGS", str(tmp_path / "state"))
     return tmp_path / "state"
+
+
+def test_no_variable_moves_that_of_hardware(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The machine's own device may be any but one of software; here the account's folder is another one."""
+    device = next((str(p) for p in Path("/dev").iterdir() if rig_leases.is_hardware_device(str(p))), "")
+    if not device:
+        pytest.skip("there is no device of hardware in /dev")
+    monkeypatch.setattr(rig_leases, "shared_path", lambda _: None)
+    monkeypatch.setattr(rig_leases, "account_path", lambda name: tmp_path / "account" / name)
+    (tmp_path / "account").mkdir()
+    quarantine("kiwi", "it has lost steps", [device])
+    monkeypatch.setenv("DODO_RIGS", str(tmp_path / "elsewhere"))
+    assert quarantined("kiwi", [device]) == "it has lost steps" == all_quarantined()["kiwi"]
+    assert not rig_leases.is_hardware_device("/dev/null") and not rig_leases.is_hardware_device("/dev/nothing")
 
 
 def test_it_lasts_until_it_is_cleared() -> None:
