@@ -1,14 +1,14 @@
 """Other drives than the Kiwi car's: two driven wheels, and a car as a bicycle. SI units, body frame as in ``model``.
 
-Two wheels follow their requests by a first-order lag and roll; the bicycle is the single track of a larger car, with
-wheels that only roll (kinematic) or with tyres (dynamic). Friction limits what the ground gives either of them.
+Two wheels follow their requests by a first-order lag and roll; the bicycle is the single track of a larger car whose
+wheels only roll. Friction limits what the ground gives either of them.
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from services.dynamic_model.model import STEERING, BodyMotion, Reading, speed_and_steering
+from services.dynamic_model.model import STEERING, BodyMotion, Reading, limited, speed_and_steering
 
 GRAVITY = 9.81  # m/s2
 LEFT, RIGHT = "left", "right"
@@ -16,11 +16,6 @@ SPEED, ACCELERATION = "speed", "acceleration"
 """Actuators: two wheels; what drives a bicycle."""
 
 WHEEL_READING = "opendlv.proxy.AxleAngularVelocityReading"
-
-
-def limited(value: float, most: float) -> float:
-    """The value, at most so far from 0."""
-    return max(-most, min(most, value))
 
 
 @dataclass(frozen=True)
@@ -119,18 +114,10 @@ class DifferentialDrive:
 class SingleTrack:
     """Parameters of a car that steers with its front wheels."""
 
-    mass: float
-    """kg"""
-    inertia: float
-    """kg m2, about the vertical axis"""
     wheel_base: float
     """m"""
     cg: float
     """m, centre of mass behind the front axle"""
-    cornering_front: float
-    """N/rad, both front wheels"""
-    cornering_rear: float
-    """N/rad, both rear wheels"""
     friction: float
     """Coefficient between tyres and ground"""
     max_steering: float
@@ -145,22 +132,11 @@ class SingleTrack:
     """m/s2"""
     top_speed: float
     """m/s, forward and in reverse"""
-    blend_speed: float
-    """m/s: tyres count above it alone, and rolling below half of it"""
 
     def __post_init__(self) -> None:
         """Raises ValueError for a centre of mass that is not between the axles."""
         if self.cg >= self.wheel_base:
             raise ValueError(f"--cg={self.cg:g} is not before the rear axle: --wheel-base={self.wheel_base:g}")
-
-    @property
-    def rear(self) -> float:
-        """Centre of mass to the rear axle, in m."""
-        return self.wheel_base - self.cg
-
-
-_SETTLING = 0.05
-"""s in which vy and yaw rate become those of rolling wheels at low speed"""
 
 
 @dataclass
@@ -168,14 +144,12 @@ class BicycleDrive:
     """A car by steering and speed, or by steering and acceleration unless it is ``by_speed``; by motion to speeds."""
 
     car: SingleTrack
-    has_tyres: bool = False
     by_speed: bool = True
     power: float = 1.0
     offset: float = 0.0
     """rad, at the front wheel"""
 
     def __post_init__(self) -> None:
-        self._to_speed = self.by_speed
         self.wheel = self.offset
         """Angle of the front wheel, in rad."""
 
@@ -195,10 +169,16 @@ class BicycleDrive:
         return {SPEED: vx, STEERING: limited(wheel, self.car.max_steering) + self.offset}
 
     def step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
-        self._to_speed, steps = SPEED in asked, self._steps(motion.vx, dt) if self.has_tyres else 1
-        for _ in range(steps):
-            motion = self._step(motion, asked, dt / steps)
-        return motion
+        """By the Runge-Kutta method of fourth order; the wheel turns meanwhile."""
+        first = self._acceleration(motion.vx, asked)
+        second = self._acceleration(motion.vx + dt / 2 * first, asked)
+        third = self._acceleration(motion.vx + dt / 2 * second, asked)
+        fourth = self._acceleration(motion.vx + dt * third, asked)
+        vx = motion.vx + dt * ((first + 2 * second + 2 * third + fourth) / 6)
+        if SPEED not in asked:  # brakes end at a standstill
+            vx = limited(max(vx, 0.0), self.car.top_speed)
+        self.wheel += limited(asked[STEERING] - self.wheel, self.car.steering_rate * dt)
+        return self._rolling(vx)
 
     def reset(self) -> None:
         """Straighten the wheel."""
@@ -207,78 +187,18 @@ class BicycleDrive:
     def odometry(self, motion: BodyMotion, asked: Mapping[str, float]) -> tuple[Reading, ...]:
         return speed_and_steering(motion.vx, self.wheel)
 
-    def _steps(self, vx: float, dt: float) -> int:
-        """So many that the solver is stable: sideways motion decays at most at this rate."""
-        car = self.car
-        damping = (car.cornering_front + car.cornering_rear) / car.mass
-        damping += (car.cg**2 * car.cornering_front + car.rear**2 * car.cornering_rear) / car.inertia
-        return math.ceil(dt * (damping / max(vx, car.blend_speed / 2) + 1 / _SETTLING))
-
-    def _step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
-        """One step of the Runge-Kutta method of fourth order; the wheel turns meanwhile."""
-        driving = asked[SPEED if self._to_speed else ACCELERATION]
-        angles = [self._turned(asked[STEERING], part * dt) for part in (0.0, 0.5, 1.0)]
-        first = self._derivative(motion, angles[0], driving)
-        second = self._derivative(_moved(motion, first, dt / 2), angles[1], driving)
-        third = self._derivative(_moved(motion, second, dt / 2), angles[1], driving)
-        fourth = self._derivative(_moved(motion, third, dt), angles[2], driving)
-        mean = [(a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(first, second, third, fourth, strict=True)]
-        self.wheel, moved = angles[2], _moved(motion, mean, dt)
-        if not self._to_speed:  # brakes end at a standstill
-            moved = BodyMotion(limited(max(moved.vx, 0.0), self.car.top_speed), moved.vy, moved.yaw_rate)
-        return moved if self.has_tyres else self._rolling(moved.vx, self.wheel)
-
-    def _turned(self, asked: float, time: float) -> float:
-        """The wheel's angle after a time in s."""
-        return self.wheel + limited(asked - self.wheel, self.car.steering_rate * time)
-
-    def _rolling(self, vx: float, wheel: float) -> BodyMotion:
+    def _rolling(self, vx: float) -> BodyMotion:
         """The motion of wheels that roll where they point, as far as friction holds it on its circle."""
-        yaw_rate = vx * math.tan(wheel) / self.car.wheel_base
+        yaw_rate = vx * math.tan(self.wheel) / self.car.wheel_base
         if abs(vx * yaw_rate) > self.car.friction * GRAVITY:
             yaw_rate = math.copysign(self.car.friction * GRAVITY / abs(vx), yaw_rate)
-        return BodyMotion(vx, self.car.rear * yaw_rate, yaw_rate)
+        return BodyMotion(vx, (self.car.wheel_base - self.car.cg) * yaw_rate, yaw_rate)
 
-    def _acceleration(self, vx: float, driving: float) -> float:
+    def _acceleration(self, vx: float, asked: Mapping[str, float]) -> float:
         """Along the body, in m/s2, as motor, brakes and friction give it."""
-        asked = (driving - vx) / self.car.speed_lag if self._to_speed else driving
-        pushes = asked * vx >= 0 and not (asked < 0 and not self._to_speed)
+        by_speed = SPEED in asked
+        wanted = (asked[SPEED] - vx) / self.car.speed_lag if by_speed else asked[ACCELERATION]
+        pushes = wanted * vx >= 0 and (wanted >= 0 or by_speed)
         most = self.car.max_acceleration if pushes else self.car.max_braking
-        given = limited(asked, most) * (self.power if pushes else 1.0)
+        given = limited(wanted, most) * (self.power if pushes else 1.0)
         return limited(given, self.car.friction * GRAVITY)
-
-    def _derivative(self, motion: BodyMotion, wheel: float, driving: float) -> tuple[float, float, float]:
-        along = self._acceleration(motion.vx, driving)
-        if not self.has_tyres:
-            return along, 0.0, 0.0
-        rolling = self._rolling(motion.vx, wheel)
-        vy, yaw = ((rolling.vy - motion.vy) / _SETTLING, (rolling.yaw_rate - motion.yaw_rate) / _SETTLING)
-        half = self.car.blend_speed / 2
-        part = max(0.0, min(1.0, (motion.vx - half) / half))
-        if part == 0.0:
-            return along, vy, yaw
-        share = part * part * (3 - 2 * part)
-        of_tyres = self._with_tyres(motion, wheel, along)
-        slower, slip, turn = (share * each for each in of_tyres)
-        return along + slower, slip + (1 - share) * vy, turn + (1 - share) * yaw
-
-    def _with_tyres(self, motion: BodyMotion, wheel: float, along: float) -> tuple[float, float, float]:
-        """What the tyres' side forces add to vx, and the derivatives of vy and yaw rate."""
-        car, (vx, vy, r) = self.car, (motion.vx, motion.vy, motion.yaw_rate)
-        slip_front = wheel - math.atan2(vy + car.cg * r, vx)
-        slip_rear = -math.atan2(vy - car.rear * r, vx)
-        front = self._side(car.cornering_front * slip_front, car.rear / car.wheel_base, along)
-        rear = self._side(car.cornering_rear * slip_rear, car.cg / car.wheel_base, along)
-        across = front * math.cos(wheel)
-        turn = (car.cg * across - car.rear * rear) / car.inertia
-        return vy * r - front * math.sin(wheel) / car.mass, (across + rear) / car.mass - vx * r, turn
-
-    def _side(self, linear: float, share: float, along: float) -> float:
-        """The side force in N of an axle with this share of the weight: linear at first, within the friction circle."""
-        most = share * self.car.mass * math.sqrt(max((self.car.friction * GRAVITY) ** 2 - along**2, 0.0))
-        return most * math.tanh(linear / most) if most > 0.0 else 0.0
-
-
-def _moved(motion: BodyMotion, derivative: "list[float] | tuple[float, float, float]", dt: float) -> BodyMotion:
-    vx, vy, yaw = derivative
-    return BodyMotion(motion.vx + dt * vx, motion.vy + dt * vy, motion.yaw_rate + dt * yaw)

@@ -7,7 +7,7 @@ SI units; body frame x forward, y left, yaw rate positive to the left.
 import math
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from dodo_dsl.opendlv.assets.car import KIWI, Car
@@ -28,14 +28,9 @@ class BodyMotion:
     yaw_rate: float = 0.0
 
 
-def wheel_angle(request: float, car: Car = KIWI) -> float:
-    """Angle of the front wheel in rad for a ground steering request in rad: scaled, then limited."""
-    return max(-car.steering_limit, min(car.steering_limit, car.steering_gain * request))
-
-
-def pedal_position(request: float, car: Car = KIWI) -> float:
-    """The pedal that the car accepts, without unit; negative is reverse."""
-    return max(car.pedal_reverse, min(car.pedal_forward, request))
+def limited(value: float, most: float) -> float:
+    """The value, at most so far from 0."""
+    return max(-most, min(most, value))
 
 
 _GAMMA = 1 - math.sqrt(0.5)
@@ -72,31 +67,13 @@ def _implicit(motion: BodyMotion, wheel: float, pedal: float, dt: float, car: Ca
     return BodyMotion(vx, (d * vy - b * r) / (a * d - b * c), (a * r - c * vy) / (a * d - b * c))
 
 
-@dataclass(frozen=True)
-class Condition:
-    """How a car differs from its data sheet: worn tyres, a weak battery, a bent steering rod, slow actuators."""
+class Reading(NamedTuple):
+    """A message of odometry with one field, in SI units."""
 
-    grip: float = 1.0
-    """Factor of both axles' cornering stiffness, and of the friction"""
-    power: float = 1.0
-    """Factor of what the motor gives, forward and in reverse"""
-    steering_offset: float = 0.0
-    """rad, added to the front wheel's angle whatever is requested; positive is to the left"""
-    latency: float = 0.0
-    """s from a request to its effect, a pure delay; counted from the update before the request"""
-
-    def of(self, car: Car) -> Car:
-        """The car with its tyres and motor in this condition."""
-        return replace(
-            car,
-            cornering_front=car.cornering_front * self.grip,
-            cornering_rear=car.cornering_rear * self.grip,
-            gain_forward=car.gain_forward * self.power,
-            gain_reverse=car.gain_reverse * self.power,
-        )
-
-
-AS_NEW = Condition()
+    message: str
+    field: str
+    sender_stamp: int
+    value: float
 
 
 class Drive(Protocol):
@@ -118,25 +95,15 @@ class Drive(Protocol):
     def reset(self) -> None:
         """Forget all that moves except the body."""
 
-    def odometry(self, motion: BodyMotion, asked: Mapping[str, float]) -> tuple["Reading", ...]:
+    def odometry(self, motion: BodyMotion, asked: Mapping[str, float]) -> tuple[Reading, ...]:
         """What its own sensors read."""
-
-
-class Reading(NamedTuple):
-    """A message of odometry with one field, in SI units."""
-
-    message: str
-    field: str
-    sender_stamp: int
-    value: float
 
 
 def speed_and_steering(speed: float, wheel: float) -> tuple[Reading, Reading]:
     """The odometry of a car that steers: m/s over ground, and the front wheel's angle in rad."""
-    return Reading(SPEED_READING, "groundSpeed", 0, speed), Reading(STEERING_READING, "groundSteering", 0, wheel)
-
-
-SPEED_READING, STEERING_READING = "opendlv.proxy.GroundSpeedReading", "opendlv.proxy.GroundSteeringReading"
+    by_name = (("GroundSpeed", "groundSpeed", speed), ("GroundSteering", "groundSteering", wheel))
+    first, second = (Reading(f"opendlv.proxy.{name}Reading", field, 0, value) for name, field, value in by_name)
+    return first, second
 
 
 @dataclass(frozen=True)
@@ -153,20 +120,22 @@ class KiwiDrive:
 
     def accepted(self, actuator: str, request: float) -> float:
         if actuator == STEERING:
-            return wheel_angle(request, self.car) + self.offset
-        return pedal_position(request, self.car)
+            return limited(self.car.steering_gain * request, self.car.steering_limit) + self.offset
+        return self._pedal(request)
+
+    def _pedal(self, request: float) -> float:
+        return max(self.car.pedal_reverse, min(self.car.pedal_forward, request))
 
     def following(self, motion: BodyMotion) -> Mapping[str, float]:
         """The pedal that holds the speed, and the wheel's angle of a steady turn."""
         car = self.car
         gain = car.gain_forward if motion.vx > 0 else car.gain_reverse
-        pedal = pedal_position(car.resistance * motion.vx / gain, car) if gain else 0.0
+        pedal = self._pedal(car.resistance * motion.vx / gain) if gain else 0.0
         vx = gain * pedal / car.resistance
         base, front, rear = car.front + car.rear, car.cornering_front, car.cornering_rear
         gradient = car.mass * (car.rear / front - car.front / rear) / base if front and rear else 0.0
         wheel = motion.yaw_rate * (base + gradient * vx * abs(vx)) / abs(vx) if vx else 0.0
-        wheel = max(-car.steering_limit, min(car.steering_limit, wheel))
-        return {STEERING: wheel + self.offset, PEDAL: pedal}
+        return {STEERING: limited(wheel, car.steering_limit) + self.offset, PEDAL: pedal}
 
     def step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
         return step(motion, asked[STEERING], asked[PEDAL], dt, self.car)
@@ -181,12 +150,11 @@ class KiwiDrive:
 class Vehicle:
     """The car through test time: it holds its last requests and advances only in `update`."""
 
-    def __init__(self, car: Car = KIWI, condition: Condition = AS_NEW, drive: Drive | None = None) -> None:
-        """Without a `drive` it is that of the Kiwi car, with the parameters of `car`."""
+    def __init__(self, drive: Drive, latency: float = 0.0) -> None:
+        """`latency` in s from a request to its effect, counted from the update before the request."""
         self.motion = BodyMotion()
-        self.car = condition.of(car)
-        self.drive: Drive = drive or KiwiDrive(self.car, condition.steering_offset)
-        self._latency = round(condition.latency * MICROSECONDS)
+        self.drive = drive
+        self._latency = round(latency * MICROSECONDS)
         self._coming: deque[tuple[int, bool, Mapping[str, float]]] = deque()
         """When a request takes effect (us), whether it is one of motion, and what it asks of which actuators."""
         self._asked = dict(self.drive.rest)
@@ -219,14 +187,6 @@ class Vehicle:
         if is_motion != self._follows:
             self._asked, self._follows = dict(self.drive.rest), is_motion
         self._asked.update(accepted)
-
-    def steer(self, request: float) -> bool:
-        """Take a ground steering request in rad."""
-        return self.request(STEERING, request)
-
-    def press(self, request: float) -> bool:
-        """Take a pedal position request."""
-        return self.request(PEDAL, request)
 
     @property
     def odometry(self) -> tuple[Reading, ...]:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from services.dynamic_model.drives import (
     SingleTrack,
     TwoWheels,
 )
-from services.dynamic_model.model import PEDAL, STEERING, BodyMotion, Condition, Drive, Vehicle
+from services.dynamic_model.model import PEDAL, STEERING, BodyMotion, Drive, KiwiDrive, Vehicle
 
 RESET = "reset"
 _CAR_ACCELERATION = 3.5
@@ -40,12 +40,7 @@ class DynamicModel(Service):
         self._messages = context.messages
         flags = context.flags
         self.period = period_of(flags["freq"])
-        condition = Condition(
-            flags["grip"], flags["power"], math.radians(flags["steering-offset"] or 0), flags["latency"]
-        )
-        car = read_car(Path(flags["vehicle"])) if flags["vehicle"] else KIWI
-        drive = _drive(flags, condition)
-        self.vehicle = Vehicle(car, condition, drive)
+        self.vehicle = Vehicle(_drive(flags), flags["latency"])
         self.inputs = self._requests(flags)
         self.inputs |= {(_MOTION, None): self._follow, ("opendlv.sim.Command", None): self._command}
         self._moves_sideways = False
@@ -96,9 +91,10 @@ class DynamicModel(Service):
             self.vehicle.reset()
 
 
-def _drive(flags: Flags, condition: Condition) -> Drive | None:
-    """The drive of the flags, None for that of the Kiwi car; raises ValueError for a car that cannot be."""
-    friction = condition.grip * (flags["friction"] or 0)
+def _drive(flags: Flags) -> Drive:
+    """The drive of the flags; raises InputError, and ValueError for a car that cannot be."""
+    grip, power, offset = flags["grip"], flags["power"], math.radians(flags["steering-offset"] or 0)
+    friction = grip * (flags["friction"] or 0)
     if flags["drive"] == "differential":
         wheels = _of(
             TwoWheels,
@@ -107,21 +103,26 @@ def _drive(flags: Flags, condition: Condition) -> Drive | None:
             max_yaw_rate=math.radians(flags["max-yaw-rate"]),
             max_acceleration=flags["max-acceleration"] or math.inf,
         )
-        return DifferentialDrive(wheels, flags["wheel-input"] == "axle", condition.power)
-    if flags["drive"] != "bicycle":
-        return None
-    car = _of(
-        SingleTrack,
-        flags,
-        cornering_front=flags["cornering-front"] * condition.grip,
-        cornering_rear=flags["cornering-rear"] * condition.grip,
-        friction=friction,
-        max_steering=math.radians(flags["max-steering"]),
-        steering_rate=math.radians(flags["steering-rate"]),
-        max_acceleration=flags["max-acceleration"] or _CAR_ACCELERATION,
+        return DifferentialDrive(wheels, flags["wheel-input"] == "axle", power)
+    if flags["drive"] == "bicycle":
+        car = _of(
+            SingleTrack,
+            flags,
+            friction=friction,
+            max_steering=math.radians(flags["max-steering"]),
+            steering_rate=math.radians(flags["steering-rate"]),
+            max_acceleration=flags["max-acceleration"] or _CAR_ACCELERATION,
+        )
+        return BicycleDrive(car, flags["speed-input"] == "speed", power, offset)
+    kiwi = read_car(Path(flags["vehicle"])) if flags["vehicle"] else KIWI
+    kiwi = replace(
+        kiwi,
+        cornering_front=kiwi.cornering_front * grip,
+        cornering_rear=kiwi.cornering_rear * grip,
+        gain_forward=kiwi.gain_forward * power,
+        gain_reverse=kiwi.gain_reverse * power,
     )
-    has_tyres, by_speed = flags["tyres"] == "dynamic", flags["speed-input"] == "speed"
-    return BicycleDrive(car, has_tyres, by_speed, condition.power, condition.steering_offset)
+    return KiwiDrive(kiwi, offset)
 
 
 def _of(car: type[Any], flags: Flags, **others: float) -> Any:

@@ -7,11 +7,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from services.dynamic_model.model import BodyMotion, Vehicle, step, wheel_angle
+from services.dynamic_model.model import PEDAL, STEERING, BodyMotion, KiwiDrive, Vehicle, limited, step
 
 MASS, INERTIA, FRONT, REAR, STIFFNESS = 1.113, 0.01, 0.12, 0.104, 15.0
 SECONDS, SLOWEST = 2.0, 0.1
 TIMES = np.linspace(0, SECONDS, 201)
+
+
+def wheel_angle(request: float) -> float:
+    return limited(request * 0.6 / 0.290888, 0.6)
 
 
 def equations(wheel: float, force: float):  # type: ignore[no-untyped-def]
@@ -47,10 +51,10 @@ def solved(start: float, steering: float, pedal: float) -> np.ndarray:
 
 
 def driven(start: float, steering: float, pedal: float, freq: int = 100) -> np.ndarray:
-    vehicle = Vehicle()
+    vehicle = Vehicle(KiwiDrive())
     vehicle.motion = BodyMotion(start)
-    vehicle.steer(steering)
-    vehicle.press(pedal)
+    vehicle.request(STEERING, steering)
+    vehicle.request(PEDAL, pedal)
     motions = [vehicle.update(round(time * 1e6)) for time in TIMES[:: 100 // freq]]
     return np.array([(each.vx, each.vy, each.yaw_rate) for each in motions]).T
 

@@ -40,8 +40,7 @@ def test_requests_move_the_body_that_its_output_tells() -> None:
 
 def test_another_car(tmp_path: Path) -> None:
     (tmp_path / "car.yml").write_text("mass: 2\n")
-    model = service(vehicle=str(tmp_path / "car.yml"), steps=4)  # deprecated
-    assert model.vehicle.car.mass == 2
+    model = service(vehicle=str(tmp_path / "car.yml"))
     model.inputs[PEDAL, None](MessageSet.standard().type(PEDAL)(position=0.1), 0)
     model.update(0)
     model.update(10_000)
@@ -122,7 +121,7 @@ def test_a_bicycle_by_speed_and_one_by_acceleration() -> None:
     messages = MessageSet.standard()
     for flags, name, field, speed in (
         ({}, SPEED, "groundSpeed", 5.0),
-        ({"speed-input": "acceleration", "tyres": "dynamic"}, ACCELERATE, "groundAcceleration", 2.0 * 6),
+        ({"speed-input": "acceleration"}, ACCELERATE, "groundAcceleration", 2.0 * 6),
     ):
         model = service(drive="bicycle", **flags)
         model.inputs[name, None](messages.type(name)(**{field: 5.0 if name == SPEED else 2.0}), 0)
@@ -151,6 +150,8 @@ def test_the_condition_of_other_drives() -> None:
         return float(outputs[0].message.vx)
 
     both = {(PEDALS, 0): {"position": 1.0}, (PEDALS, 1): {"position": 1.0}}
+    kiwi: dict[tuple[str, int | None], dict[str, float]] = {(PEDAL, None): {"position": 0.14}}
+    assert speed(10, "kiwi", kiwi, power=0.5) == pytest.approx(0.455, abs=1e-6)
     assert speed(3, "differential", both) == pytest.approx(0.91, rel=1e-6)
     assert speed(3, "differential", both, power=0.5) == pytest.approx(0.455, rel=1e-6)
     assert speed(1, "differential", both, grip=0.05, friction=1) == pytest.approx(0.05 * 9.81, rel=1e-3)
