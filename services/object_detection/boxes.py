@@ -150,6 +150,10 @@ Value = Box | str | TypeNumber
 """The content of a message: DetectionBoundingBox, DetectionProperty or DetectionType."""
 
 
+MOST_LABEL = 60
+"""Characters of a class: an application may send any."""
+
+
 @dataclass
 class Detections:
     """One sender's messages on a frame, by detectionId; the first of each kind counts."""
@@ -167,7 +171,7 @@ class Detections:
         elif isinstance(value, TypeNumber):
             self.types.setdefault(number, value)
         else:
-            self.labels.setdefault(number, plain(value))
+            self.labels.setdefault(number, plain(value)[:MOST_LABEL])
 
     def labelled(self) -> list[LabelledBox]:
         """The boxes, each with its property as class, or else ``type N``, or else none."""

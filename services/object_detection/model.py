@@ -12,6 +12,7 @@ from services.base.clock import MICROSECONDS
 from services.base.evaluator import EARLY
 from services.object_detection.boxes import Box, DetectedFrame, Detections, FrameKey, LabelledBox, Truth, Value
 from services.object_detection.score import (
+    KINDS,
     MEASURES,
     CountsByClass,
     DetectionLimits,
@@ -20,7 +21,6 @@ from services.object_detection.score import (
     Score,
     Silence,
     areas,
-    class_name,
     compare,
 )
 
@@ -48,7 +48,7 @@ def _telling(broken: Sequence[Check], labels: Sequence[str]) -> list[Check]:
         measure, _, label = check.name.partition("-")
         of = f"-{label}" if label else ""
         is_implied = measure == "f1" and bool({f"precision{of}", f"recall{of}"} & names)
-        alike = {f"{measure}-{class_name(each)}" for each in labels}
+        alike = {f"{measure}-{each or 'unnamed'}" for each in labels}
         if not is_implied and not (label and measure in MEASURES and {measure, *alike} <= names):
             told.append(check)
     return told
@@ -75,7 +75,7 @@ def _fault(check: Check, score: Score) -> str:
     name = f"{'F1' if measure == 'f1' else measure}{f' of {label}' if label else ''}"
     if check.value is None:
         return f"{name} has no value ({bound}), because {_nothing(measure)}"
-    counts = {class_name(each): of for each, of in score.counts}[label] if label else score.counts.total()
+    counts = {each or "unnamed": of for each, of in score.counts}[label] if label else score.counts.total()
     wrong = {"precision": _count(counts.false, "false detection"), "recall": f"{counts.missed} missed"}
     both = f"{wrong['precision']} and {wrong['recall']}"
     return f"{name} is {check.told} ({bound}), with {wrong.get(measure, both)} beside {counts.hits} found"
@@ -98,8 +98,8 @@ def _nothing(measure: str) -> str:
 
 
 def _kinds(score: Score) -> str:
-    sentence = score.counts.mistakes.sentence
-    return f"; {sentence}" if sentence else ""
+    kinds = ", ".join(f"{count} {KINDS[kind]}" for kind, count in score.counts.kinds.most_common())
+    return f"; false detections: {kinds}" if kinds else ""
 
 
 def _worst(score: Score) -> str:

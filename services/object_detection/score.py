@@ -1,10 +1,8 @@
-"""How frames are judged: objects found, false or missed, kinds of mistakes, silence, and the checks made of them.
+"""How frames are judged: objects found, false or missed, silence, and the checks made of them.
 
-Kinds of mistakes let a verdict say what is wrong. Silence is which frames the application left without an answer, and
-for how long it said nothing.
+Silence is which frames the application left without an answer, and for how long it said nothing.
 """
 
-import json
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,12 +12,10 @@ from typing import NamedTuple
 
 from services.base import Check, JudgedBoxes
 from services.base.judged import LabelledArea, ScoredArea
-from services.object_detection.boxes import Box, LabelledBox, best_pairs, overlaps
+from services.object_detection.boxes import LabelledBox, best_pairs, overlaps
 
 OUTSIDE = 2.0
 """Fraction of the picture from which on a box is far outside of it."""
-SMALL = 0.6
-"""Mean height of the missed objects to that of the found ones, below which size is the matter."""
 KINDS = {
     "far": "far outside the picture (are they in pixels?)",
     "misnamed": "on objects of another class",
@@ -29,60 +25,18 @@ KINDS = {
 }
 
 
-@dataclass
-class Mistakes:
-    """False detections by KINDS, and heights of missed and found objects in fractions of the picture."""
-
-    kinds: Counter[str] = field(default_factory=Counter)
-    missed: list[float] = field(default_factory=list)
-    found: list[float] = field(default_factory=list)
-
-    def add(self, other: "Mistakes") -> None:
-        """Add those of another frame."""
-        self.kinds.update(other.kinds)
-        self.missed.extend(other.missed)
-        self.found.extend(other.found)
-
-    @property
-    def sentence(self) -> str:
-        """Where the false detections are, and whether small objects are missed; empty without mistakes."""
-        places = [f"{count} {KINDS[kind]}" for kind, count in self.kinds.most_common()]
-        where = f"false detections: {', '.join(places)}" if places else ""
-        missed, found = (sum(heights) / max(1, len(heights)) for heights in (self.missed, self.found))
-        sizes = f"{missed:.2g} of the picture's height on average, and found ones {found:.2g}"
-        size = f"missed objects are small: {sizes}" if 0.0 < missed < SMALL * found else ""
-        return "; ".join(part for part in (where, size) if part)
-
-
-@dataclass(frozen=True)
-class Frame:
-    """The boxes of a frame: false detections, and true ones that were hit or missed."""
-
-    false: Sequence[LabelledBox]
-    hit: Sequence[LabelledBox]
-    missed: Sequence[LabelledBox]
-
-
-def mistakes(frame: Frame, threshold: float) -> Mistakes:
-    """The mistakes of one frame; ``threshold`` is the overlap that a hit needs."""
-    kinds = Counter(_kind(each, frame, threshold) for each in frame.false)
-    return Mistakes(kinds, [each.box.height for each in frame.missed], [each.box.height for each in frame.hit])
-
-
-def _kind(detection: LabelledBox, frame: Frame, threshold: float) -> str:
-    if max(abs(value) for value in detection.box) > OUTSIDE:
+def _kind(detection: LabelledBox, hit: Sequence[LabelledBox], missed: Sequence[LabelledBox], threshold: float) -> str:
+    """Of a false detection; ``threshold`` is the overlap that a hit needs."""
+    if max(map(abs, detection.box)) > OUTSIDE:
         return "far"
-    true = [*frame.hit, *frame.missed]
-    others = [each.box for each in true if each.label != detection.label]
-    if _overlap(detection.box, others) > threshold:
+    true = [*hit, *missed]
+    agreed = overlaps([detection.box], [each.box for each in true])[0].tolist()
+    near = [each for each, score in zip(true, agreed, strict=True) if score > threshold]
+    if any(each.label != detection.label for each in near):
         return "misnamed"
-    if _overlap(detection.box, [each.box for each in frame.hit if each.label == detection.label]) > threshold:
+    if any(each in hit for each in near):
         return "doubled"
-    return "loose" if _overlap(detection.box, [each.box for each in true]) > 0.0 else "nowhere"
-
-
-def _overlap(box: Box, others: Collection[Box]) -> float:
-    return float(overlaps([box], list(others)).max(initial=0.0))
+    return "loose" if any(agreed) else "nowhere"
 
 
 @dataclass
@@ -100,6 +54,11 @@ class Counts:
         self.false += other.false
         self.missed += other.missed
         self.overlap += other.overlap
+
+    @property
+    def mistakes(self) -> int:
+        """False and missed ones together."""
+        return self.false + self.missed
 
     @property
     def precision(self) -> float | None:
@@ -124,13 +83,13 @@ class Counts:
 
 @dataclass
 class CountsByClass:
-    """Counts by class, in the order in which classes came, and what kinds of mistakes they contain.
+    """Counts by class, in the order in which classes came, and of false detections by KINDS.
 
     Those of one frame have its ``boxes``.
     """
 
     by_label: dict[str, Counts] = field(default_factory=dict)
-    mistakes: Mistakes = field(default_factory=Mistakes)
+    kinds: Counter[str] = field(default_factory=Counter, compare=False)
     boxes: JudgedBoxes = field(default=JudgedBoxes((), (), ()), compare=False, repr=False)
 
     def add(self, label: str, counts: Counts) -> None:
@@ -172,7 +131,7 @@ def compare(
         right += [(label, *mine[row].box, float(scores[row, column])) for row, column in pairs]
         for column, each in enumerate(real):
             (hit if column in columns else missed).append(each)
-    result.mistakes = mistakes(Frame(false, hit, missed), threshold)
+    result.kinds.update(_kind(each, hit, missed, threshold) for each in false)
     result.boxes = JudgedBoxes(right, areas(false), areas(missed))
     return result
 
@@ -252,12 +211,8 @@ class Silence:
 
 
 MEASURES = ("precision", "recall", "f1")
-MOST_NAME = 100
-_ROOM, _ROOM_OF_CHECK = 10_000, 100
-"""Characters for checks of one measure of classes that only the application names, and what each takes but its name.
-
-The runner reads lines of at most 65,536 characters; three measures and a long reason fit.
-"""
+MOST_CLASSES = 20
+"""With checks of their own, of those that only the application names: the runner reads lines of 64 KiB."""
 
 
 @dataclass(frozen=True)
@@ -297,18 +252,12 @@ class DetectionLimits:
         return limit
 
 
-@dataclass(frozen=True)
-class WorstFrame:
+class WorstFrame(NamedTuple):
     """The frame with the most mistakes, where it was, and what was wrong; ``key`` identifies it in the evidence."""
 
     place: str
     counts: Counts
-    key: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def mistakes(self) -> int:
-        """False and missed ones together."""
-        return self.counts.false + self.counts.missed
+    key: Mapping[str, float]
 
 
 @dataclass
@@ -339,10 +288,10 @@ class Score:
         self.answered += answered
         for label, counts in frame:
             self.counts.add(label, counts)
-        self.counts.mistakes.add(frame.mistakes)
-        worst = WorstFrame(place, frame.total(), key)
-        if worst.mistakes > (self.worst.mistakes if self.worst else 0):
-            self.worst = worst
+        self.counts.kinds += frame.kinds
+        counts = frame.total()
+        if counts.mistakes > (self.worst.counts.mistakes if self.worst else 0):
+            self.worst = WorstFrame(place, counts, key)
 
     def evidence(self) -> dict[str, float | str | None]:
         """The worst frame with its counts, and the longest silence; times in s of the test."""
@@ -377,20 +326,10 @@ class Score:
         )
 
     def _classes(self, limits: DetectionLimits) -> Iterator[Check]:
-        """Of all classes with true boxes, and of as many others as a line of a verdict can have."""
-        room = _ROOM
+        made_up = [label for label, counts in self.counts if not counts.hits + counts.missed]
         for label, counts in self.counts:
-            if not counts.hits + counts.missed:
-                room -= len(json.dumps(class_name(label))) + _ROOM_OF_CHECK
-                if room < 0:
-                    continue
-            for name in MEASURES:
+            for name in MEASURES if label not in made_up[MOST_CLASSES:] else ():
                 limit = limits.of(name) if limits.each_class else None
                 yield Check.least(
-                    f"{name}-{class_name(label)}", getattr(counts, name), limit, parameters=(f"min-{name}",)
+                    f"{name}-{label or 'unnamed'}", getattr(counts, name), limit, parameters=(f"min-{name}",)
                 )
-
-
-def class_name(label: str) -> str:
-    """A class in names of checks, of at most ``MOST_NAME`` characters: an application's labels may be of any length."""
-    return (label if len(label) <= MOST_NAME else label[: MOST_NAME - 1] + "…") or "unnamed"
