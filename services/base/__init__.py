@@ -5,7 +5,7 @@ from services.base.evaluator import Evaluator, JudgedTime, UnjudgeableError
 from services.base.flags import Flags, FlagsError, Share
 from services.base.judged import Judged, JudgedBoxes, Series
 from services.base.process import run
-from services.base.service import Check, Context, Handler, Output, Service, Verdict, period_of
+from services.base.service import Check, Context, Handler, Output, Service, UnusableMessageError, Verdict, period_of
 
 __all__ = [
     "Check",
@@ -24,6 +24,7 @@ __all__ = [
     "Service",
     "Share",
     "UnjudgeableError",
+    "UnusableMessageError",
     "Verdict",
     "period_of",
     "run",

@@ -23,7 +23,7 @@ from services.base.clock import MICROSECONDS, Clock
 from services.base.evaluator import UnjudgeableError
 from services.base.members import END_OF_INPUT, NOT_SHOWN, Members, World
 from services.base.runner import tell
-from services.base.service import IDLE_PERIOD, Framed, Handler, Output, Service
+from services.base.service import IDLE_PERIOD, Framed, Handler, Output, Service, UnusableMessageError
 
 SHORTEST = 10_000
 """Microseconds; less harms no test, and usual on any machine."""
@@ -128,6 +128,7 @@ class Loop:
     """Whether the verdict ends the test: the others decide on what came until then."""
     _handlers: dict[int, list[tuple[int | None, Handler, Layout]]] = field(default_factory=dict)
     _stamps: HeardStamps = field(init=False)
+    _unusable: set[tuple[int, int]] = field(default_factory=set)
     _began: int | None = None
     """When the test began, in us."""
     _reported: int = 0
@@ -248,7 +249,12 @@ class Loop:
                     began, arrived = self._began, self.service.arrived
                     elapsed = arrived - began if began and arrived else None
                     self.members.check_numbers(envelope, message, elapsed)
-                handler(message, envelope.sample_time)
+                try:
+                    handler(message, envelope.sample_time)
+                except UnusableMessageError as error:
+                    if (key := (envelope.data_type, envelope.sender_stamp)) not in self._unusable:
+                        self._unusable.add(key)
+                        _log.warning("ignored this and all such %s/%d: %s", type(message).__name__, key[1], error)
 
     def _tell_strangers(self) -> None:
         """In the reason of a failed verdict, because they may explain it, else as notes."""

@@ -129,6 +129,11 @@ def _number(value: float | None) -> float | None:
 
 IDLE_PERIOD = 50_000
 
+
+class UnusableMessageError(ValueError):
+    """A handler cannot use its message: the loop ignores it, and logs the first of each kind and sender."""
+
+
 Handler = Callable[[Any, int], None]
 """Takes a message and its sample time in microseconds."""
 

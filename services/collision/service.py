@@ -1,6 +1,5 @@
 """The evaluator of a closed loop on the bus."""
 
-import math
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -8,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.opendlv.assets.map_file import NO_BODIES
-from dodo_dsl.opendlv.assets.track import VehicleBox, VehiclePose, track
-from dodo_dsl.opendlv.attitude import heading_of
+from dodo_dsl.opendlv.assets.track import VehicleBox, track
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base import Context, Flags, Handler, UnjudgeableError
+from services.base.vehicle_pose import vehicle_pose
 from services.collision.bodies import Footprints, load_footprints
 from services.collision.model import Requests, TrackEvaluator
 
@@ -31,11 +30,9 @@ class Collision(TrackEvaluator):
         box = VehicleBox(flags["length"], flags["width"])
         bodies = _bodies(flags)
         super().__init__(track(flags), box, Requests(list(dict.fromkeys(labels)), flags["max-silence"]), bodies)
-        self._log = context.log
         self._on_rig, self._wall = context.on_rig, wall
         self._seen: float | None = None
         self._gap: float | None = None
-        self.rejected = 0
         self.inputs = {(FRAME, stamp): partial(self._take_body, stamp) for stamp in bodies}
         self.inputs[FRAME, flags["frame-id"]] = self._take_frame
         for label, (name, stamp) in zip(labels, requests, strict=True):
@@ -63,23 +60,10 @@ class Collision(TrackEvaluator):
         if self._seen is not None:
             self._gap = max(self._gap or 0.0, now - self._seen)
         self._seen = now
-        pose = self._pose(frame)
-        if pose is not None:
-            self.look(pose, sample_time)
+        self.look(vehicle_pose(frame), sample_time)
 
     def _take_body(self, stamp: int, frame: Any, sample_time: int) -> None:
-        pose = self._pose(frame)
-        if pose is not None:
-            self.look_at_body(stamp, pose, sample_time)
-
-    def _pose(self, frame: Any) -> VehiclePose | None:
-        heading = heading_of(frame.qx, frame.qy, frame.qz, frame.qw)
-        if heading is not None and math.isfinite(frame.x + frame.y):
-            return VehiclePose(frame.x, frame.y, heading)
-        self.rejected += 1
-        if self.rejected == 1:
-            self._log.warning("ignored a Frame without a position or an attitude, and will ignore all such")
-        return None
+        self.look_at_body(stamp, vehicle_pose(frame), sample_time)
 
 
 def _port(text: str, context: Context) -> tuple[str, int | None]:

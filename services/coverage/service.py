@@ -1,15 +1,13 @@
 """The evaluator of an area that has to be passed over, on the bus."""
 
-import math
 from pathlib import Path
 from typing import Any
 
 import shapely
 
 from dodo_dsl.opendlv.assets import map_file
-from dodo_dsl.opendlv.assets.track import VehiclePose
-from dodo_dsl.opendlv.attitude import heading_of
 from services.base import Context, Flags
+from services.base.vehicle_pose import vehicle_pose
 from services.coverage.model import CoverageEvaluator, CoverageGrid, Footprint, enclosed
 
 _SIDES = ("x-min", "x-max", "y-min", "y-max")
@@ -25,17 +23,10 @@ class Coverage(CoverageEvaluator):
         footprint = Footprint(diameter, 0.0) if diameter else Footprint(flags["length"], flags["width"])
         grid = CoverageGrid(_area(flags), flags["cell"], footprint)
         super().__init__(flags["area"] or "the rectangle", grid, flags["min-share"], flags["max-time"])
-        self._log, self._rejected = context.log, 0
         self.inputs = {("opendlv.sim.Frame", flags["frame-id"]): self._take_frame}
 
     def _take_frame(self, frame: Any, sample_time: int) -> None:
-        heading = heading_of(frame.qx, frame.qy, frame.qz, frame.qw)
-        if heading is not None and math.isfinite(frame.x + frame.y):
-            self.look(VehiclePose(frame.x, frame.y, heading), sample_time)
-            return
-        self._rejected += 1
-        if self._rejected == 1:
-            self._log.warning("ignored a Frame without a position or an attitude, and will ignore all such")
+        self.look(vehicle_pose(frame), sample_time)
 
 
 build = Coverage

@@ -8,7 +8,7 @@ from dodo_dsl.opendlv import odvd
 from dodo_dsl.opendlv.attitude import quaternion
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
-from services.base import Context, Flags, Output, Service, period_of
+from services.base import Context, Flags, Output, Service, UnusableMessageError, period_of
 from services.integrator.model import BodyPose, Integrator, Twist, angles
 
 FRAME, RESET = "opendlv.sim.Frame", "reset"
@@ -20,7 +20,6 @@ class Integration(Service):
 
     def __init__(self, context: Context) -> None:
         flags = context.flags
-        self._log = context.log
         self.period = period_of(flags["freq"])
         self.body = Integrator(start(flags))
         self._frame = context.messages.type(FRAME)
@@ -47,10 +46,9 @@ class Integration(Service):
 
     def _take_state(self, state: Any, sample_time: int) -> None:
         twist = Twist((state.vx, state.vy, state.vz), (state.rollRate, state.pitchRate, state.yawRate))
-        if all(map(math.isfinite, (*twist.velocity, *twist.rates))):
-            self.body.feed(twist, sample_time)
-            return
-        self._log.warning("ignored a KinematicState of %s", twist)
+        if not all(map(math.isfinite, (*twist.velocity, *twist.rates))):
+            raise UnusableMessageError(f"{twist} is not finite")
+        self.body.feed(twist, sample_time)
 
 
 def _old_payload(messages: MessageSet, pose: BodyPose) -> bytes:

@@ -36,4 +36,4 @@ def build(context: Context) -> LidarService:
     lidar = Lidar(*place, math.radians(flags["field-of-view"]), flags["rays"], near, far, flags["noise"])
     outlines = Outlines(Path(flags["map-path"]), flags["walls"], flags["frame-id"], flags["not-walls"])
     scanner = Scanner(outlines, lidar, flags["seed"], flags["id"])
-    return LidarService(context, scanner, Places(flags["frame-id"], outlines.moving, context.log))
+    return LidarService(context, scanner, Places(flags["frame-id"], outlines.moving))

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from services.base import Context, Output, Service, period_of
+from services.base import Context, Output, Service, UnusableMessageError, period_of
 from services.odometry.model import Errors, Odometer, Twist
 
 
@@ -16,7 +16,7 @@ class Odometry(Service):
         turns = (math.radians(flags[name]) for name in ("yaw-per-metre", "yaw-bias", "yaw-noise"))
         self._errors = Errors(flags["scale-error"], flags["speed-noise"], *turns)
         self._seed, self._stamp = flags["seed"] << 32 | flags["id"], flags["id"]
-        self._log, self._type = context.log, context.messages.type("robot.OdometryReading")
+        self._type = context.messages.type("robot.OdometryReading")
         self._odometer = Odometer(self._errors, self._seed)
         self.inputs = {
             ("opendlv.sim.KinematicState", flags["frame-id"]): self._take_state,
@@ -32,10 +32,9 @@ class Odometry(Service):
 
     def _take_state(self, state: Any, sample_time: int) -> None:
         twist = Twist(state.vx, state.vy, state.yawRate)
-        if all(map(math.isfinite, twist)):
-            self._odometer.feed(twist, sample_time)
-        else:
-            self._log.warning("ignored a KinematicState of %s", twist)
+        if not all(map(math.isfinite, twist)):
+            raise UnusableMessageError(f"{twist} is not finite")
+        self._odometer.feed(twist, sample_time)
 
     def _command(self, message: Any, _sample_time: int) -> None:
         if message.command == "reset":

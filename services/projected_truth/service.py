@@ -5,13 +5,14 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import cv2
 
 from dodo_dsl.opendlv.envelope import MICROSECONDS
 from services.base import Context, Flags, Output, Service
 from services.projected_truth.path import FollowedMemory, MeasuredPath
-from services.scene.camera import CameraFrame, CameraPose, body_pose, mount
+from services.scene.camera import CameraPose, body_pose, mount
 from services.scene.lens import Lens, camera_of, lens_of
 from services.scene.render import Renderer
 from services.scene.scene import SceneOptions, load_scene
@@ -43,19 +44,14 @@ class ProjectedTruth(Service):
         self.inputs = {("opendlv.sim.Frame", stamp): partial(self._take, path) for stamp, path in paths.items()}
         self._waiting: deque[int] = deque(maxlen=_MOST)
         self._has_begun = False
-        self.projected, self.missed, self.refused = 0, 0, 0
+        self.projected, self.missed = 0, 0
 
     def begin(self, now: int) -> None:
         self._has_begun = True
 
-    def _take(self, path: MeasuredPath, frame: CameraFrame, sample_time: int) -> None:
+    def _take(self, path: MeasuredPath, frame: Any, sample_time: int) -> None:
         """Where the vehicle or another body is, as measured; ``sample_time`` in us of test time."""
-        try:
-            path.add(sample_time, body_pose(frame))
-        except ValueError as error:
-            if not self.refused:
-                _log.warning("refused the frame of %d us, and will refuse all such: %s", sample_time, error)
-            self.refused += 1
+        path.add(sample_time, body_pose(frame))
 
     def update(self, now: int) -> Iterator[Output]:
         picture = self._followed(now)

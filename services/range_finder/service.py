@@ -18,7 +18,7 @@ class RangeFinderService(Service):
     def __init__(self, context: Context, model: RangeFinder, moving: tuple[int, ...]) -> None:
         flags = context.flags
         self.period = period_of(flags["freq"])
-        self._model, self.places = model, Places(flags["frame-id"], moving, context.log)
+        self._model, self.places = model, Places(flags["frame-id"], moving)
         self._type, self._field = context.messages.type(flags["message"]), flags["message"].split(".")[-1]
         self._field = self._field.removesuffix("Reading").lower()
         self.inputs = self.places.inputs

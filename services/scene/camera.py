@@ -8,11 +8,13 @@ frames, so that a picture can show what passes while the shutter is open.
 
 import math
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Any, Self
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+
+from services.base import UnusableMessageError
 
 Array = npt.NDArray[np.float64]
 
@@ -33,10 +35,10 @@ def euler_rotation(roll: float, pitch: float, yaw: float) -> Array:
 
 
 def quaternion_rotation(x: float, y: float, z: float, w: float) -> Array:
-    """The rotation of a quaternion of any length; ValueError when it has none or is not finite."""
+    """The rotation of a quaternion of any length; UnusableMessageError when it has none or is not finite."""
     length = math.sqrt(x * x + y * y + z * z + w * w)
     if not math.isfinite(length) or length < 1e-6:
-        raise ValueError(f"quaternion ({x}, {y}, {z}, {w}) is not a rotation")
+        raise UnusableMessageError(f"quaternion ({x}, {y}, {z}, {w}) is not a rotation")
     x, y, z, w = x / length, y / length, z / length, w / length
     return np.array(
         [
@@ -192,23 +194,11 @@ FARTHEST = 1e6
 """Frames farther than this from the origin, in m, are refused."""
 
 
-class CameraFrame(Protocol):
-    """The fields of ``opendlv.sim.Frame``: position in m and attitude of a body in the world."""
-
-    x: float
-    y: float
-    z: float
-    qx: float
-    qy: float
-    qz: float
-    qw: float
-
-
-def body_pose(frame: CameraFrame) -> CameraPose:
-    """The pose in a frame; ValueError when it has none."""
+def body_pose(frame: Any) -> CameraPose:
+    """The pose in an ``opendlv.sim.Frame``; raises UnusableMessageError."""
     position = np.array([frame.x, frame.y, frame.z], dtype=np.float64)
     if not (np.abs(position) <= FARTHEST).all():
-        raise ValueError(f"position ({frame.x}, {frame.y}, {frame.z}) is not within {FARTHEST:.0f} m")
+        raise UnusableMessageError(f"position ({frame.x}, {frame.y}, {frame.z}) is not within {FARTHEST:.0f} m")
     return CameraPose(position, quaternion_rotation(frame.qx, frame.qy, frame.qz, frame.qw))
 
 

@@ -1,6 +1,5 @@
 """Where a vehicle and the bodies of a map are, by their newest frames."""
 
-import logging
 import math
 from collections.abc import Iterable
 from functools import partial
@@ -14,10 +13,9 @@ from services.scene.outlines import Place
 class Places:
     """``known`` has them by sender stamp; ``inputs`` takes the frames of a service."""
 
-    def __init__(self, own: int, moving: Iterable[int], log: logging.Logger) -> None:
+    def __init__(self, own: int, moving: Iterable[int]) -> None:
         self.known: dict[int, Place] = {}
-        self.rejected = 0
-        self._own, self._log = own, log
+        self._own = own
         self.inputs: dict[tuple[str, int | None], Handler] = {
             ("opendlv.sim.Frame", stamp): partial(self._take, stamp) for stamp in (own, *moving)
         }
@@ -28,12 +26,6 @@ class Places:
         return self.known.get(self._own)
 
     def _take(self, stamp: int, frame: Any, _sample_time: int) -> None:
-        try:
-            pose = body_pose(frame)
-        except ValueError as error:
-            self.rejected += 1
-            if self.rejected == 1:
-                self._log.warning("refused a frame of %d, and will refuse all such: %s", stamp, error)
-            return
+        pose = body_pose(frame)
         x, y, z = pose.position.tolist()
         self.known[stamp] = Place(x, y, z, math.atan2(pose.rotation[1, 0], pose.rotation[0, 0]))

@@ -1,13 +1,13 @@
 """The virtual camera: follows a vehicle's frames and draws a picture whenever one is due."""
 
-import logging
 from collections import deque
 from collections.abc import Callable
+from typing import Any
 
 import cv2
 import numpy as np
 
-from services.scene.camera import LONGEST_GAP, CameraFrame, CameraMotion, CameraPose, body_pose, motion_between, still
+from services.scene.camera import LONGEST_GAP, CameraMotion, CameraPose, body_pose, motion_between, still
 from services.scene.raster import Image
 from services.scene.render import Renderer
 from services.virtual_camera.optics import Optics
@@ -47,35 +47,19 @@ class VirtualCamera:
         self._start = still(start) if start else None
         self._frames: deque[tuple[CameraPose, int]] = deque(maxlen=2)
         """The poses of the last frames, and their sample times."""
-        self._log = logging.getLogger(__name__)
-        self.refused = 0
-        """How many frames had no valid pose; the camera stays where it was."""
 
-    def take_frame(self, frame: CameraFrame, sample_time: int) -> None:
+    def take_frame(self, frame: Any, sample_time: int) -> None:
         """The vehicle is where the frame says; ``sample_time`` in us of test time."""
-        if pose := self._pose(frame, sample_time):
-            self._frames.append((pose, sample_time))
+        self._frames.append((body_pose(frame), sample_time))
 
     @property
     def bodies(self) -> tuple[int, ...]:
         """The sender stamps of all other bodies that move."""
         return self._renderer.bodies.stamps
 
-    def take_body(self, stamp: int, frame: CameraFrame, sample_time: int) -> None:
+    def take_body(self, stamp: int, frame: Any, sample_time: int) -> None:
         """Another body, of these frames, is where this one says; what moves stands still while the shutter is open."""
-        pose = self._pose(frame, sample_time)
-        if pose is not None:
-            self._renderer.place(stamp, pose)
-
-    def _pose(self, frame: CameraFrame, sample_time: int) -> CameraPose | None:
-        """The pose in a frame; None for one without, which is counted, and logged once."""
-        try:
-            return body_pose(frame)
-        except ValueError as error:
-            if not self.refused:
-                self._log.warning("refused the frame of %d us, and will refuse all such: %s", sample_time, error)
-            self.refused += 1
-            return None
+        self._renderer.place(stamp, body_pose(frame))
 
     def update(self, now: int) -> CameraPose | None:
         """Draws and publishes one picture, sampled at ``now`` (us of test time); the camera's pose in the world."""

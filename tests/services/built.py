@@ -2,11 +2,11 @@
 
 import importlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from dodo_dsl.opendlv.message_set import MessageSet
-from services.base import Context
+from services.base import Context, UnusableMessageError
 from services.base.flags import load_manifest, parse
 from tests.services.process import ROOT
 
@@ -34,7 +34,8 @@ def refusal(module: str, *flags: str) -> str:
 
 def hand(service: Any, name: str, time: int = 0, sender_stamp: int | None = None, **fields: Any) -> None:
     """Give a service a message, as its loop does."""
-    service.inputs[name, sender_stamp](MESSAGES.type(name)(**fields), time)
+    with suppress(UnusableMessageError):
+        service.inputs[name, sender_stamp](MESSAGES.type(name)(**fields), time)
 
 
 def hide(service: Any, due: int, until: int, number: int = 0, sampled: int = 0, sampled_until: int = 0) -> None:

@@ -10,7 +10,7 @@ from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import RealTimeClock
 from services.base.loop import HeardStamps, Lateness, Loop
-from services.base.service import Service
+from services.base.service import Service, UnusableMessageError
 
 STEER, PEDAL = 1090, 1086
 INPUTS = {(STEER, 0): "opendlv.proxy.GroundSteeringRequest", (STEER, 9): "opendlv.proxy.GroundSteeringRequest"}
@@ -80,3 +80,16 @@ def test_updates_that_were_skipped_are_late() -> None:
     lateness.add(16_667, 16_667)
     lateness.add(1_000_000, 1_000_000)
     assert lateness.news() == {"updates": 61, "late": 58, "worst_s": 0.0}
+
+
+def test_what_a_handler_cannot_use_is_ignored_and_logged_once(cid: int, caplog: pytest.LogCaptureFixture) -> None:
+    def refuse(_message: object, _time: int) -> None:
+        raise UnusableMessageError("it has no attitude")
+
+    service = Service()
+    service.inputs = {("opendlv.sim.Frame", 2): refuse}
+    with Session(cid) as session:
+        loop = Loop("judge", service, session, RealTimeClock(), 0)
+        for _ in range(2):
+            loop.handle(Envelope(session.messages.id("opendlv.sim.Frame"), b"", 0, 0, 0, 2))
+    assert [each.getMessage() for each in caplog.records] == ["ignored this and all such Frame/2: it has no attitude"]

@@ -72,7 +72,7 @@ def test_noise_wanders_as_its_equation_says_and_comes_again_with_its_seed() -> N
     assert after(4.0, Twist(0.5), 3, speed_noise=0.2).x == ways[3] and len(set(ways)) == 60
 
 
-def test_on_the_bus(caplog: pytest.LogCaptureFixture) -> None:
+def test_on_the_bus() -> None:
     def reading(now: int) -> list[float]:
         (output,) = service.update(now)
         assert (output.message.DESCRIPTOR.full_name, output.sender_stamp) == ("robot.OdometryReading", 4)
@@ -81,7 +81,7 @@ def test_on_the_bus(caplog: pytest.LogCaptureFixture) -> None:
     flags = ["--freq=50", "--id=4", "--frame-id=3", "--scale-error=0.1", "--yaw-bias=1", "--yaw-per-metre=2"]
     with built("odometry", *flags) as service:
         hand(service, STATE, 0, 3, vx=2.0, vy=math.nan)
-        assert (service.period, service.update(0)) == (20_000, []) and "ignored a KinematicState" in caplog.text
+        assert (service.period, service.update(0)) == (20_000, [])
         hand(service, STATE, 0, 3, vx=2.0, vy=0.5, yawRate=0.1)
         turn = 0.1 + math.radians(1 + 2 * 2)
         end = Pose().moved(Twist(2.2, 0.55, turn), 1.0)

@@ -108,15 +108,12 @@ def test_a_pose_that_does_not_come_is_waited_for_and_then_extrapolated(resources
 
 def test_pictures_without_a_pose_are_counted(resources: ExitStack, caplog: pytest.LogCaptureFixture) -> None:
     projection = Projection(resources, "--frame-id=4")
-    frame = MESSAGES.type("opendlv.sim.Frame")(x=float("nan"))
-    projection.service.inputs["opendlv.sim.Frame", 4](frame, BEGIN)
     projection.picture(BEGIN)
     assert projection.update(BEGIN + PATIENCE + 1) == []
     assert isinstance(projection.service, ProjectedTruth)
-    assert (projection.service.projected, projection.service.missed, projection.service.refused) == (0, 1, 1)
+    assert (projection.service.projected, projection.service.missed) == (0, 1)
     resources.close()
     assert "1 pictures have no truth: no pose was measured near them" in caplog.text
-    assert "refused the frame" in caplog.text
 
 
 def test_other_bodies_are_where_they_were_at_the_picture(resources: ExitStack, write_map: Callable[..., Path]) -> None:

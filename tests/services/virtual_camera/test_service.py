@@ -20,6 +20,7 @@ from services.scene.camera import CameraPose
 from services.scene.render import Renderer
 from services.scene.scene import load_scene
 from services.virtual_camera.service import build
+from tests.services.built import hand
 
 MANIFEST = load_manifest(package_data.services() / "virtual_camera")
 STRAIGHT = package_data.registry() / "maps" / "straight"
@@ -166,7 +167,7 @@ def test_models_at_frames_move_with_them_but_for_the_own_one(camera, write_map):
     frame = MESSAGES.type("opendlv.sim.Frame")
     made.service.inputs["opendlv.sim.Frame", 5](frame(y=3.0, qw=1.0), START)
     shots = [made.shoot((0.0, 0.0, 0.0), frame_id=4)]
-    made.service.inputs["opendlv.sim.Frame", 5](frame(y=9.0), START)
+    hand(made.service, "opendlv.sim.Frame", START, 5, y=9.0)
     shots += [made.shoot((0.0, 0.0, 0.0), frame_id=4), made.shoot((0.0, 1.0, 0.0), frame_id=4)]
     assert np.array_equal(shots[0].argb, shots[1].argb)
     assert not np.array_equal(shots[0].argb, alone.argb)
