@@ -67,7 +67,7 @@ def take_picture(flags: Flags) -> SharedPicture:
     camera = open_camera(flags)
     if isinstance(camera, FileCamera):
         with contextlib.closing(camera):
-            return camera.read()
+            return camera.take()
     with contextlib.closing(Grabber(camera, flags["source"])) as grabber:
         first = _next(grabber, flags["source"])
         end = time.monotonic() + SETTLED

@@ -16,7 +16,7 @@ import time
 from collections.abc import Iterator
 from itertools import chain, repeat
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import cv2
 import numpy as np
@@ -31,7 +31,7 @@ _SIDES = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
 
 
 class FileCamera:
-    """One picture of the file for each ``read``, in order, and from the first again after the last."""
+    """One picture of the file for each ``take``, in order, and from the first again after the last."""
 
     def __init__(self, path: Path, width: int, height: int) -> None:
         """Pictures are scaled to ``width`` and ``height``; raises ValueError or OSError for a file without any."""
@@ -43,7 +43,7 @@ class FileCamera:
             raise ValueError(f"{path} has no pictures, expected an image, a video or a recording")
         self._pictures: Iterator[Image] = chain([first], pictures)
 
-    def read(self) -> SharedPicture:
+    def take(self) -> SharedPicture:
         """The next picture, without a time."""
         return from_bgr(next(self._pictures), *self._size)
 
@@ -125,22 +125,10 @@ def longest_silence(freq: float, exposure: float) -> float:
 JOIN_PATIENCE = 2.0
 
 
-class Camera(Protocol):
-    """Where pictures come from."""
-
-    def read(self) -> SharedPicture:
-        """The next picture; raises CameraError when there are no more."""
-        ...
-
-    def close(self) -> None:
-        """Close the camera."""
-        ...
-
-
 class Grabber:
     """Keeps the newest picture of a camera; ``name`` names it in errors."""
 
-    def __init__(self, camera: Camera, name: str, silence: float = SILENCE) -> None:
+    def __init__(self, camera: "Camera", name: str, silence: float = SILENCE) -> None:
         self._camera, self._name, self._silence = camera, name, silence
         self._changed = threading.Condition()
         self._newest: SharedPicture | None = None
@@ -347,3 +335,6 @@ def rpicam_command(width: int, height: int, freq: float, exposure: float) -> lis
     size = ["--width", str(width), "--height", str(height)]
     rate = ["--framerate", f"{freq:g}", "--shutter", str(round(exposure * 1e6))]
     return [PROGRAM, "--nopreview", "--timeout", "0", "--codec", "yuv420", "--flush", *size, *rate, "--output", "-"]
+
+
+Camera = V4l2Camera | RpiCamera

@@ -36,20 +36,6 @@ def test_it_waits_for_the_test_and_ends_with_its_trajectory() -> None:
     assert beacon.finished
 
 
-def test_it_holds_when_asked() -> None:
-    beacon = service("--length=1", "--speed=1", "--hold", "--start=at-once")
-    sent(beacon, 0)
-    assert sent(beacon, 99 * SECOND)[0].message.x == 1
-    assert not beacon.finished
-
-
-def test_without_a_length_it_never_ends() -> None:
-    beacon = service("--start=at-once", "--speed=2")
-    sent(beacon, 0)
-    assert sent(beacon, 1000 * SECOND)[0].message.x == 2000
-    assert not beacon.finished
-
-
 def test_the_state_is_sent_when_asked() -> None:
     beacon = service("--length=9", "--yaw=90", "--speed=1.5", "--state-id=7")
     still = sent(beacon, 0)[1]

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.assets.trajectory import PathPoint, Trajectory, TrajectoryError, headings, straight, wrapped
+from dodo_dsl.opendlv.assets.trajectory import PathPoint, Trajectory, TrajectoryError, straight, wrapped
 
 
 def points(*places: tuple[float, ...]) -> list[PathPoint]:
@@ -18,19 +18,6 @@ def test_a_speed_makes_the_times() -> None:
     pose = trajectory.at(1.25)
     assert (pose.x, pose.y) == pytest.approx((1.5, 2))
     assert math.hypot(*trajectory.at(3).velocity) == pytest.approx(2)
-
-
-def test_times_in_the_table_count_and_the_speed_does_not() -> None:
-    trajectory = Trajectory(points((0, 0, 0.0, 1.0), (1, 0, 0.0, 5.0)), speed=99)
-    assert trajectory.duration == 5
-    assert (trajectory.at(3).x, trajectory.at(3).velocity) == (0.5, (0.25, 0, 0))
-
-
-def test_it_stands_before_its_first_and_after_its_last_point() -> None:
-    trajectory = Trajectory(points((1, 2, 0.5, 1.0), (2, 2, 0.5, 3.0)), speed=1)
-    for time, x in ((0, 1), (0.999, 1), (3, 2), (100, 2)):
-        pose = trajectory.at(time)
-        assert (pose.x, pose.velocity, pose.yaw_rate) == (x, (0, 0, 0), 0)
 
 
 def test_every_point_is_met_exactly() -> None:
@@ -47,10 +34,6 @@ def test_heading_turns_by_the_shorter_way_through_the_seam() -> None:
     assert math.degrees(trajectory.at(0.5).yaw) == pytest.approx(175)
     assert math.degrees(trajectory.at(1.5).yaw) == pytest.approx(-175)
     assert trajectory.at(1).yaw_rate == pytest.approx(math.radians(10))
-
-
-def test_standing_still_it_looks_as_before() -> None:
-    assert headings(points((0, 0), (0, 0), (0, 1), (0, 1), (0, 2))) == pytest.approx([math.pi / 2] * 5)
 
 
 def test_a_straight_way_with_and_without_end() -> None:
@@ -74,13 +57,6 @@ def test_velocities_are_the_derivatives_of_the_pose(parts: list[tuple[float, flo
     assert (after.x - before.x) / step / 2 == pytest.approx(now.velocity[0], abs=1e-5 + abs(now.velocity[0]) * 1e-5)
     assert (after.y - before.y) / step / 2 == pytest.approx(now.velocity[1], abs=1e-5 + abs(now.velocity[1]) * 1e-5)
     assert wrapped(after.yaw - before.yaw) / step / 2 == pytest.approx(now.yaw_rate, abs=1e-4, rel=1e-4)
-
-
-@given(st.floats(-1e3, 1e3))
-def test_wrapped_is_the_same_angle(angle: float) -> None:
-    assert -math.pi < wrapped(angle) <= math.pi
-    assert math.cos(wrapped(angle)) == pytest.approx(math.cos(angle), abs=1e-9)
-    assert math.sin(wrapped(angle)) == pytest.approx(math.sin(angle), abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -17,14 +17,6 @@ def test_pictures_come_whole_and_in_order(rpicam: Path) -> None:
     assert rpicam.read_text().split("\n") == rpicam_command(64, 48, 50, 0.02)[1:]
 
 
-def test_the_command() -> None:
-    words = rpicam_command(640, 480, 10, 0.1)
-    assert words[0] == "rpicam-vid"
-    for pair in (["--codec", "yuv420"], ["--framerate", "10"], ["--shutter", "100000"], ["--timeout", "0"]):
-        assert any(words[i : i + 2] == pair for i in range(len(words)))
-    assert words[-2:] == ["--output", "-"]
-
-
 @pytest.mark.parametrize(
     ("mode", "words"),
     [
@@ -39,16 +31,6 @@ def test_why_it_ended(rpicam: Path, monkeypatch: pytest.MonkeyPatch, mode: str, 
         for _ in range(4):
             camera.read()
     camera.close()
-
-
-@pytest.mark.thorough
-def test_one_that_does_not_go_is_killed(rpicam: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("FAKE_MODE", "stubborn")
-    monkeypatch.setattr("services.camera.sources.PATIENCE", 0.2)
-    camera = RpiCamera(64, 48, freq=100, exposure=0.01)
-    camera.read()
-    camera.close()
-    assert camera._process.returncode == -9
 
 
 def test_padded_rows_and_a_missing_program(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,11 +72,6 @@ def test_what_the_device_refuses(monkeypatch: pytest.MonkeyPatch, fixed: dict[in
     assert capture.released
 
 
-def test_another_rate_is_noted(monkeypatch: pytest.MonkeyPatch) -> None:
-    opened(monkeypatch, {cv2.CAP_PROP_FPS: 5})
-    assert V4l2Camera(DEVICE, 64, 48, 10, 0.1).notes == ["/dev/null refuses the rate of 10 Hz and has 5"]
-
-
 def test_no_camera(tmp_path: Path) -> None:
     with pytest.raises(OSError, match=r"there is no camera .*; is it plugged in"):
         V4l2Camera(tmp_path / "video0", 64, 48, 10, 0.1)

@@ -1,8 +1,6 @@
 """How close a vehicle comes to other bodies, against times sampled densely, and what is said of it."""
 
-import json
 import math
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,12 +9,10 @@ import shapely.affinity
 
 from dodo_dsl.opendlv.assets.track import Track, VehicleBox, VehiclePose, between, outline
 from services.base import UnjudgeableError, Verdict
-from services.collision.bodies import OtherBody, least_distance, load_footprints
+from services.collision.bodies import OtherBody, least_distance
 from services.collision.model import TrackEvaluator
 
 BOX = VehicleBox(0.36, 0.16)
-WEDGE = "v 0.1 0.2 0\nv -0.1 0.2 0\nv 0 -0.3 0\nv 0 0.2 0.3\nv 9 9 9\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
-"""Pointed along -y, which is the front of a model at a frame; a vertex belongs to no face."""
 TRIANGLE = shapely.Polygon([(0.3, 0.0), (-0.2, 0.1), (-0.2, -0.1)])
 BEGIN = 1_700_000_000_000_000
 
@@ -47,29 +43,6 @@ def test_the_distance_is_that_of_both_at_one_time(poses: tuple[tuple[float, floa
     found = least_distance(own, its, BOX, TRIANGLE)  # type: ignore[arg-type]
     expected = sampled(own, its)  # type: ignore[arg-type]
     assert expected - 1.5e-3 <= found <= expected + 1e-9 + 2e-3 * (expected > 0)
-
-
-def test_paths_that_cross_at_different_times_do_not_meet() -> None:
-    """The areas that the two cover overlap."""
-    own, its = (VehiclePose(0, 0, 0), VehiclePose(4, 0, 0)), (VehiclePose(3, -5, 1.57), VehiclePose(3, 0.0, 1.57))
-    assert least_distance(own, its, BOX, TRIANGLE) > 0.3
-
-
-def write_map(folder: Path, *models: dict[str, Any]) -> Path:
-    (folder / "car.obj").write_text(WEDGE)
-    entries = [{"file": "car.obj", "color": [1, 0, 0], **model} for model in models]
-    (folder / "map.json").write_text(json.dumps({"model": entries}))
-    return folder
-
-
-def test_footprints_of_models_at_frames(tmp_path: Path) -> None:
-    folder = write_map(
-        tmp_path, {"name": "kiwi", "frames": [0, 1, 2]}, {"name": "bus", "frames": [7]}, {"name": "cone"}
-    )
-    found = load_footprints(folder, own=0)
-    assert {stamp: name for stamp, (name, _) in found.items()} == {1: "kiwi/1", 2: "kiwi/2", 7: "bus"}
-    for _, shape in found.values():
-        assert shapely.symmetric_difference(shape, TRIANGLE).area < 1e-9, "x is forward"
 
 
 class Drive:
@@ -127,20 +100,6 @@ def test_following_is_judged_by_the_distance_at_one_time() -> None:
             drive.its((n - 5) / 100, 1.0 + (n - 5) / 100)
     assert drive.verdict is None
     assert drive.judge._measures.body_margin == pytest.approx(1.0 - 0.2 - 0.18, abs=1e-9)
-
-
-def test_too_close_is_told_with_its_limit() -> None:
-    drive = Drive(margin=0.1)
-    drive.its(0.0, 2.0)
-    drive.own(0.0, 0.0)
-    drive.own(1.0, 1.55)
-    drive.its(1.0, 2.0)
-    verdict = drive.verdict
-    assert verdict is not None
-    assert verdict.reason == (
-        "came within 0.070 m of body kiwi-2 after 1.00 s at x = 1.55 m, y = 0.00 m, expected at least 0.1 m"
-    )
-    assert checks(verdict)["body-margin"] == (pytest.approx(0.07), False)
 
 
 def test_the_goal_counts_only_when_no_body_was_hit_up_to_then() -> None:

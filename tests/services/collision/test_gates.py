@@ -8,7 +8,7 @@ import shapely
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.assets.track import Gate, Gates, VehiclePose, crossings
+from dodo_dsl.opendlv.assets.track import Gate, Gates, VehiclePose
 
 # The path has its corners at whole numbers and the gates theirs aside, so that none lies on the other.
 corners = st.lists(st.tuples(st.integers(-6, 6), st.integers(-6, 6)), min_size=2, max_size=12)
@@ -62,19 +62,6 @@ def test_gates_are_counted_as_shapely_finds_them(
     assert done == (list(range(last or 0, len(moves))) if crossed == len(order) else [])
 
 
-@given(corners, lines)
-@pytest.mark.thorough
-def test_the_share_is_where_shapely_finds_the_crossing(
-    path: list[tuple[int, int]], ends: tuple[tuple[float, float], tuple[float, float]]
-) -> None:
-    line = shapely.MultiLineString([ends])
-    for a, b in pairwise(path):
-        point = shapely.LineString([a, b]).intersection(line) if a != b else None
-        found = list(crossings(line, VehiclePose(*a, 0), VehiclePose(*b, 0)))
-        wanted = [] if point is None or point.is_empty else [math.dist(a, (point.x, point.y)) / math.dist(a, b)]
-        assert found == pytest.approx(wanted)
-
-
 @pytest.mark.parametrize("stops", [[0.5], [1.0], [0.99999, 1.0, 1.00001]])
 @pytest.mark.parametrize("is_back", [False, True])
 def test_a_stop_on_the_line_is_one_crossing(stops: list[float], is_back: bool) -> None:
@@ -82,20 +69,3 @@ def test_a_stop_on_the_line_is_one_crossing(stops: list[float], is_back: bool) -
     places = [(0.0, 0.0), *((x, 0.0) for x in stops), (2.0, 0.0)]
     drive(gates, *(places[::-1] if is_back else places))
     assert gates.crossed == 1
-
-
-def test_the_joint_of_two_lines_has_no_hole_and_counts_once() -> None:
-    name = shapely.MultiLineString([[(1, -1), (1, 0)], [(1, 0), (1, 1)]])
-    gates = Gates([("a", name)] * 2)
-    drive(gates, (0, 0), (2, 0))
-    assert gates.crossed == 1
-
-
-def test_a_gate_out_of_turn_does_not_count() -> None:
-    gates = Gates([gate("a", (1, -1), (1, 1)), gate("b", (2, -1), (2, 1))])
-    drive(gates, (1.5, 0), (2.5, 0))
-    assert gates.crossed == 0 and gates.next is not None and gates.next[0] == "a"
-    drive(gates, (2.5, 0), (0.5, 0))
-    assert gates.crossed == 1
-    assert drive(gates, (0.5, 0), (2.5, 0)) == [pytest.approx(0.75)]
-    assert gates.next is None and drive(gates, (2.5, 0), (3, 0)) == [0.0]

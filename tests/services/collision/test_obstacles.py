@@ -51,17 +51,6 @@ def test_what_is_no_wall(wrong: str, tmp_path: Path) -> None:
         load_obstacles(file)
 
 
-def test_a_text_file_without_walls_is_no_map(tmp_path: Path) -> None:
-    file = tmp_path / "room.txt"
-    file.write_text("\n ;\n")
-    with pytest.raises(ValueError, match="the file is empty, expected a wall"):
-        load_obstacles(file)
-
-
-def test_a_map_may_have_none(tmp_path: Path) -> None:
-    assert load_obstacles(write(tmp_path, {"model": []})) == {}
-
-
 @pytest.mark.parametrize(
     ("document", "message"),
     [
@@ -83,12 +72,6 @@ def test_what_is_no_map_is_said_with_its_place(tmp_path: Path, document: Any, me
     assert str(caught.value).startswith(f"{tmp_path / 'map.json'}{message}")
 
 
-def test_a_missing_map(tmp_path: Path) -> None:
-    with pytest.raises(ValueError) as caught:
-        load_obstacles(tmp_path / "nowhere")
-    assert str(caught.value) == f"{tmp_path / 'nowhere' / 'map.json'}: cannot be read: No such file or directory"
-
-
 def test_unknown_names_are_said_with_what_there_is(tmp_path: Path) -> None:
     names = ("left", "right", "finish")
     write(tmp_path, {"obstacles": [{"name": name, "lines": [0, 0, 1, 1]} for name in names]})
@@ -102,15 +85,6 @@ def test_unknown_names_are_said_with_what_there_is(tmp_path: Path) -> None:
     assert str(caught.value) == f"--goal: the map {tmp_path} has no obstacle 'xyz'; it has finish, left, right"
     with pytest.raises(ValueError, match="has no obstacle 'xyz'; it has none"):
         pick({}, ["xyz"], "goal", tmp_path)
-
-
-def test_obstacles_without_a_name_have_a_number(tmp_path: Path) -> None:
-    lines = [[0, 0, 1, 1], [0, 0, 2, 2], [0, 0, 3, 3]]
-    write(tmp_path, {"obstacles": [{"lines": lines[0]}, {"name": "left", "lines": lines[1]}, {"lines": lines[2]}]})
-    obstacles = load_obstacles(tmp_path)
-    assert list(obstacles) == ["obstacle-1", "left", "obstacle-3"]
-    assert list(pick_walls(obstacles, ["obstacle-3"], (), tmp_path, 0.15)) == ["obstacle-3"]
-    assert list(pick_walls(obstacles, ["*"], ["left"], tmp_path, 0.15)) == ["obstacle-1", "obstacle-3"]
 
 
 BLOCKS = [

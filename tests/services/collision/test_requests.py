@@ -31,10 +31,3 @@ def test_silence_before_the_first_request_and_before_the_begin_does_not_count() 
     assert requests.fault(60 * SECOND, 0) is None
     requests.forget(70 * SECOND)
     assert requests.fault(72 * SECOND, 0) is None and requests.fault(73 * SECOND, 0) is not None
-
-
-def test_short_names_of_those_that_never_came() -> None:
-    requests = Requests(["my.Request", "opendlv.proxy.PedalPositionRequest"])
-    requests.take("my.Request", 0)
-    assert requests.missing == ["PedalPositionRequest"]
-    assert requests.checks() == () and requests.fault(int(1e12), 0) is None

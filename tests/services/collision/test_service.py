@@ -12,7 +12,6 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from services.base import Context, Flags, UnjudgeableError, UnusableMessageError
 from services.collision.model import REQUESTS
 from services.collision.service import Collision
-from tests.services.built import hand
 
 FRAME = "opendlv.sim.Frame"
 LANE = {
@@ -66,22 +65,6 @@ def frame(x: float, y: float, heading: float = 0.0) -> Any:
     return MessageSet.standard().type(FRAME)(x=x, y=y, qz=math.sin(heading / 2), qw=math.cos(heading / 2))
 
 
-def test_frames_of_its_vehicle_bring_the_verdict(lane: Path) -> None:
-    judge = service(lane)
-    assert set(judge.inputs) == {
-        (FRAME, 2),
-        ("opendlv.proxy.GroundSteeringRequest", None),
-        ("opendlv.proxy.PedalPositionRequest", None),
-    }
-    judge.begin(START)
-    look = judge.inputs[FRAME, 2]
-    look(frame(0, 0), START)
-    assert judge.verdict is None
-    look(frame(0.5, 0.05, math.pi / 2), START + 500_000)
-    assert judge.verdict is not None
-    assert judge.verdict.reason == "hit wall left after 0.50 s at x = 0.50 m, y = 0.05 m"
-
-
 def test_requests_are_heard_and_time_runs_out_in_updates(lane: Path) -> None:
     judge = service(lane)
     judge.begin(START)
@@ -115,32 +98,6 @@ def test_frames_that_stop_are_no_verdict_about_the_application(lane: Path) -> No
     now[0] += 0.2
     with pytest.raises(UnjudgeableError, match="no Frame of the vehicle has come for 2 s, and they came before"):
         judge.update(START + 20)
-
-
-def test_off_a_rig_a_vehicle_may_stop_telling_where_it_is(lane: Path) -> None:
-    now = [100.0]
-    judge = service(lane, wall=lambda: now[0])
-    judge.begin(START)
-    for count in range(3):
-        judge.inputs[FRAME, 2](frame(0, 0), START + count)
-        now[0] += 0.5
-    now[0] += 60.0
-    judge.update(START + 10)
-    assert judge.verdict is None
-
-
-def test_slow_frames_and_a_single_one_are_waited_for(lane: Path) -> None:
-    now = [100.0]
-    judge = service(lane, wall=lambda: now[0], on_rig=True)
-    judge.begin(START)
-    look = judge.inputs[FRAME, 2]
-    look(frame(0, 0), START)
-    now[0] += 5
-    judge.update(START + 1)
-    look(frame(0, 0), START + 2)
-    now[0] += 14
-    judge.update(START + 3)
-    assert judge.verdict is None
 
 
 @pytest.mark.parametrize(
@@ -186,15 +143,6 @@ def test_a_block_of_the_map_is_hit(lane: Path) -> None:
     assert judge.verdict is not None
     assert judge.verdict.reason == "hit wall crate after 0.80 s at x = 0.80 m, y = 0.00 m"
     assert judge.verdict.evidence["obstacle"] == "crate"
-
-
-def test_a_wheel_that_is_never_asked_is_named(lane: Path) -> None:
-    model = service(lane, requests=[f"{REQUESTS[1]}/0", f"{REQUESTS[1]}/1"], **{"max-time": 1.0})
-    model.update(START)
-    model.inputs[REQUESTS[1], 0](None, START)
-    hand(model, FRAME, START, 2, qw=1.0)
-    model.update(START + 2_000_000)
-    assert model.verdict is not None and "sent no PedalPositionRequest/1" in model.verdict.reason
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 import base64
 import json
 import math
-import random
 from array import array
 from collections.abc import Callable
 from dataclasses import replace
@@ -198,17 +197,6 @@ def test_with_sample_times_of_their_own_nobody_stays_where_it_is_easy() -> None:
     assert "the samples cover " in it.verdict.reason
 
 
-def test_with_sample_times_of_their_own_the_newest_says_what_was_observed() -> None:
-    it = judge(SignalLimits(mean=0.1, gap=2 * SECOND), Target(RAMP.times, RAMP.values, 500 * SECOND), from_begin=False)
-    for time in range(5):
-        it.arrived = BEGIN + (50 + time) * SECOND
-        it.take(time / 10, (500 + time) * SECOND)
-    it.update(BEGIN + 60 * SECOND + 1)
-    assert it.verdict is not None
-    assert it.verdict.reason.startswith("nothing came between 4.00 s and 10.00 s (at most 2 s)")
-    assert values(it.verdict)["gap"] == 6
-
-
 @pytest.mark.parametrize(
     ("limits", "seconds", "text"),
     [
@@ -232,16 +220,6 @@ def test_no_sample_is_never_a_pass() -> None:
     assert values(verdict)["mean"] is None and not verdict.checks[0].ok
 
 
-def test_samples_outside_the_target_are_left_out_and_counted() -> None:
-    it = judge(SignalLimits(mean=9.0, samples=2))
-    hear(it, (-1, 5), (5, 0.5), (11, 50), (12, 50))
-    assert decided(it).outcome == "failed"
-    assert decided(it).reason.startswith(
-        "only 1 samples came (at least 2), and 2 outside the target's time; worst at 5.00"
-    )
-    assert (values(decided(it))["outside"], values(decided(it))["mean"]) == (2, 0.0)
-
-
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_a_sample_that_is_no_number_fails(value: float) -> None:
     it = judge(SignalLimits(mean=9.0))
@@ -250,32 +228,6 @@ def test_a_sample_that_is_no_number_fails(value: float) -> None:
     it = judge(SignalLimits(mean=9.0))
     hear(it, (7, value))
     assert decided(it).reason == f"{SIGNAL} was not a finite number in its one sample, first at 7.00 s"
-
-
-@given(
-    st.lists(st.tuples(st.integers(-2 * SECOND, 12 * SECOND), st.floats(-5, 5)), min_size=1, unique_by=lambda s: s[0]),
-    st.randoms(),
-)
-@pytest.mark.thorough
-def test_the_order_of_samples_does_not_matter(heard: list[tuple[int, float]], random_: random.Random) -> None:
-    mixed = list(heard)
-    random_.shuffle(mixed)
-    both = []
-    for order in (heard, mixed):
-        it = judge(SignalLimits(mean=1.0, samples=1))
-        hear(it, *((time / SECOND, value) for time, value in order))
-        both.append(decided(it))
-    assert both[0].outcome == both[1].outcome
-    assert values(both[0]) == {name: pytest.approx(value) for name, value in values(both[1]).items()}
-
-
-def test_sample_times_meet_those_of_the_target() -> None:
-    target = Target(RAMP.times, RAMP.values, start=500 * SECOND)
-    it = judge(SignalLimits(mean=0.0, start=SECOND), target, from_begin=False)
-    it.take(9.0, 500 * SECOND)
-    it.take(0.3, 503 * SECOND)
-    it.take(9.0, BEGIN + 3 * SECOND)
-    assert values(decided(it)) | {"samples": 1, "outside": 1, "mean": 0.0} == values(decided(it))
 
 
 def test_a_live_target_is_interpolated_when_all_is_there() -> None:
@@ -331,14 +283,6 @@ def test_what_is_recorded_is_marked_as_it_was_judged() -> None:
     assert values[:3] == [3.0, 0.2, 0.45]
 
 
-def test_without_a_verdict_there_is_a_record_and_nothing_makes_none() -> None:
-    it = judge(SignalLimits(distance=0.3), target=None)
-    assert recorded(it) == {}
-    hear(it, (1, 0.5))
-    it.take_target(0.4, BEGIN + SECOND)
-    assert recorded(it) == {"samples": ([1], [0.5], [0]), "target": ([1], [0.4], [0])}
-
-
 def test_of_very_many_samples_the_farthest_are_recorded() -> None:
     away = np.zeros(model.MOST_SAMPLES * 2 + 2)
     away[[7, 40_000]] = 1.0
@@ -379,11 +323,6 @@ def test_a_target_without_a_sign_is_an_error_of_the_test() -> None:
     hear(it, (1, 0.1))
     with pytest.raises(UnjudgeableError, match=r"^the target is nowhere farther than 2 from 0: it has no sign$"):
         decided(it)
-
-
-@pytest.mark.parametrize("limits", [SignalLimits(band=9, frame_share=0.0), SignalLimits(sign_share=0.0)])
-def test_no_sample_is_in_no_frame(limits: SignalLimits) -> None:
-    assert decided(judge(limits)).outcome == "failed"
 
 
 def test_nothing_has_to_be_held_while_no_frame_is_shown() -> None:

@@ -2,50 +2,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
-from services.continuous_signal.target import Signal, Target, check, in_order, read_recording, read_table
+from services.continuous_signal.target import Signal, check, in_order, read_recording, read_table
 
 SECOND = 1_000_000
 STEERING = Signal("opendlv.proxy.GroundSteeringRequest", 3, "groundSteering")
 times = st.lists(st.integers(-(10**15), 10**15), min_size=2, max_size=30, unique=True).map(sorted)
 
 
-def interpolated(knots: list[int], values: list[float], time: int) -> float | None:
-    """Brute force: the straight line between the two rows around a time."""
-    for at, end in enumerate(knots):
-        if time == end:
-            return values[at]
-        if at and knots[at - 1] < time < end:
-            share = (time - knots[at - 1]) / (end - knots[at - 1])
-            return values[at - 1] + share * (values[at] - values[at - 1])
-    return None
-
-
-@given(times, st.data())
-@pytest.mark.thorough
-def test_between_its_samples_it_is_a_straight_line_and_beyond_them_nothing(
-    knots: list[int], data: st.DataObject
-) -> None:
-    values = data.draw(st.lists(st.floats(-1e3, 1e3), min_size=len(knots), max_size=len(knots)))
-    asked = data.draw(st.lists(st.integers(knots[0] - 9, knots[-1] + 9) | st.sampled_from(knots), max_size=30))
-    found = Target(np.array(knots), np.array(values)).at(np.array(asked, np.int64))
-    expected = [interpolated(knots, values, time) for time in asked]
-    assert [None if np.isnan(value) else pytest.approx(value, abs=1e-6) for value in found] == expected
-
-
 def test_samples_in_any_order_and_the_last_of_equal_times() -> None:
     target = in_order(np.array([3, 1, 3, 2]), np.array([30.0, 10.0, 33.0, 20.0]))
     assert (target.times.tolist(), target.values.tolist()) == ([1, 2, 3], [10.0, 20.0, 33.0])
-
-
-def test_no_samples_are_a_target_that_says_nothing() -> None:
-    target = in_order(np.array([], np.int64), np.array([]))
-    assert np.isnan(target.at(np.array([0, 1]))).all()
 
 
 def test_a_table_of_sample_times_is_exact_and_begins_with_its_first_row(tmp_path: Path) -> None:

@@ -67,15 +67,6 @@ def test_it_passes_as_soon_as_the_share_is_reached() -> None:
         assert it.verdict.checks[1].value == 3.0
 
 
-def test_turning_and_passing_twice_count_once() -> None:
-    """A thin bar of 2 m that turns by a third of a circle around its centre covers two sectors, however often."""
-    grid = CoverageGrid(shapely.box(-2, -2, 2, 2), 0.05, Footprint(2.0, 0.02))
-    for _ in range(2):
-        grid.move(VehiclePose(0, 0, 0), VehiclePose(0, 0, math.tau / 3))
-        grid.move(VehiclePose(0, 0, math.tau / 3), VehiclePose(0, 0, 0))
-        assert grid.share * 16 == pytest.approx(2 * math.pi / 3 + 0.02, abs=0.05)
-
-
 def test_a_way_against_shapely() -> None:
     """A disc along a curve, in an area with a bay: the share that a buffered line covers."""
     area = shapely.Polygon([(0, 0), (5, 0), (5, 3), (3, 3), (2.5, 1.5), (2, 3), (0, 3)])

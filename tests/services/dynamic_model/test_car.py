@@ -3,8 +3,6 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.assets.car import KEYS, KIWI, read_car
 from dodo_dsl.opendlv.assets.problem import InputError
@@ -49,21 +47,3 @@ def test_mistakes_are_named_with_file_and_line(tmp_path: Path, text: str, senten
     with pytest.raises(InputError) as caught:
         read_car(path)
     assert str(caught.value).startswith(f"{path}{sentence}")
-
-
-def test_a_missing_file(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"none\.yml: cannot be read: No such file"):
-        read_car(tmp_path / "none.yml")
-
-
-@given(st.binary(max_size=100) | st.text("mas: 1\n[]{}&*!'-", max_size=40).map(str.encode))
-@pytest.mark.thorough
-def test_any_bytes_are_a_car_or_one_sentence(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
-    path = tmp_path_factory.getbasetemp() / "any.yml"
-    path.write_bytes(data)
-    try:
-        car = read_car(path)
-    except InputError as error:
-        assert str(error).startswith(str(path))
-    else:
-        assert car.mass > 0

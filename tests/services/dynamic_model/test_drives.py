@@ -77,24 +77,12 @@ def test_the_pedal_turns_a_wheel_beyond_its_dead_zone(pedal: float, speed: float
     assert DifferentialDrive(WHEELS, power=0.5).accepted(RIGHT, pedal) == pytest.approx(speed / 2)
 
 
-def test_a_wheel_that_turns_faster_pulls_to_the_other_side() -> None:
-    vehicle = driven(DifferentialDrive(replace(WHEELS, wheel_offset=0.1)), 3.0, {LEFT: 0.5, RIGHT: 0.5})
-    assert vehicle.motion.yaw_rate == pytest.approx(0.03 * 0.1 * 30 * 0.4 / 0.9 / 0.15)
-
-
 def test_wheels_spin_where_friction_does_not_hold_them() -> None:
     vehicle = driven(DifferentialDrive(replace(WHEELS, friction=0.05, motor_lag=0.0)), 0.5, {LEFT: 1.0, RIGHT: 1.0})
     assert vehicle.motion.vx == pytest.approx(0.05 * GRAVITY * 0.5)
     assert [reading.value for reading in vehicle.odometry] == [30.0, 30.0]
     turned = driven(DifferentialDrive(replace(WHEELS, friction=0.05)), 9.0, {LEFT: 0.5, RIGHT: 0.9}).motion
     assert abs(turned.vx * turned.yaw_rate) <= 0.05 * GRAVITY * 1.001
-
-
-def test_the_point_before_the_axle_moves_sideways() -> None:
-    motion = driven(
-        DifferentialDrive(replace(WHEELS, axle_offset=0.1), by_axle=True), 2.0, {LEFT: 8.0, RIGHT: 12.0}
-    ).motion
-    assert motion.vy == pytest.approx(0.1 * motion.yaw_rate) and motion.vy > 0
 
 
 @pytest.mark.parametrize("drive", [DifferentialDrive(WHEELS), BicycleDrive(CAR)])
@@ -135,17 +123,6 @@ def test_motor_brakes_and_ground_limit_the_acceleration() -> None:
     assert [gained(10, 2.0, power=0.5), gained(10, 9.0, friction=0.1)] == pytest.approx([1.0, 0.1 * GRAVITY])
     assert gained(3, -8.0) == pytest.approx(-3.0)  # and it stands
     assert gained(0, -8.0) == 0.0
-
-
-def test_the_wheel_turns_at_its_rate_to_its_limit_and_the_offset_comes_beyond_it() -> None:
-    drive = BicycleDrive(CAR, offset=0.05)
-    angles = [driven(drive, 0.0, {}).odometry[1].value]
-    for seconds in (0.5, 1.0):
-        drive.reset()
-        angles.append(driven(drive, seconds, {STEERING: 2.0}).odometry[1].value)
-    drive.reset()
-    angles.append(driven(drive, 3.0, {STEERING: 2.0}).odometry[1].value)
-    assert angles == pytest.approx([0.05, 0.3, 0.55, 0.65])
 
 
 def test_a_centre_of_mass_behind_the_rear_axle_is_refused() -> None:

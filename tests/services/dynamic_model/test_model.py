@@ -1,4 +1,3 @@
-import math
 from dataclasses import replace
 
 import pytest
@@ -44,23 +43,6 @@ def test_requests_are_scaled_and_limited() -> None:
     assert [KiwiDrive().accepted(PEDAL, request) for request in (0.05, 0.5, -1)] == [0.05, 0.14, -0.9]
 
 
-def test_time_does_not_run_backwards() -> None:
-    vehicle = Vehicle(KiwiDrive())
-    vehicle.update(10)
-    with pytest.raises(ValueError, match="backwards by 3 us"):
-        vehicle.update(7)
-
-
-@given(st.integers(1, 2_000_000))
-def test_however_seldom_it_is_updated_the_steps_are_fine_and_lose_no_time(elapsed: int) -> None:
-    vehicle = Vehicle(KiwiDrive())
-    vehicle.request(PEDAL, 0.1)
-    vehicle.update(0)
-    vehicle.update(elapsed)
-    limit, decay = KIWI.gain_forward * 0.1 / KIWI.resistance, KIWI.resistance / KIWI.mass * elapsed / SECOND
-    assert vehicle.motion.vx == pytest.approx(-limit * math.expm1(-decay), rel=1e-4)
-
-
 def test_a_car_that_is_not_stable_is_an_error_and_not_a_state() -> None:
     vehicle = Vehicle(KiwiDrive(replace(KIWI, cornering_rear=0.0, steering_gain=1.0)))
     vehicle.request(PEDAL, 0.14)
@@ -83,21 +65,3 @@ def test_a_request_acts_after_the_latency_and_not_before(latency: int, period: i
         now += period
         late.update(now)
     assert prompt.update(now).vx == pytest.approx(late.motion.vx, rel=0.02)
-
-
-def test_a_reset_forgets_what_is_under_way() -> None:
-    vehicle = Vehicle(KiwiDrive(), 0.1)
-    vehicle.update(0)
-    vehicle.request(PEDAL, 0.1)
-    vehicle.reset()
-    assert drive(vehicle, 1).vx == 0
-
-
-def test_the_offset_of_the_steering_is_that_of_the_wheel_in_degrees_of_a_request() -> None:
-    bent, asked = Vehicle(KiwiDrive(offset=0.05 * KIWI.steering_gain)), Vehicle(KiwiDrive())
-    for vehicle in (bent, asked):
-        vehicle.request(PEDAL, 0.1)
-    asked.request(STEERING, 0.05)
-    assert drive(bent, 2) == drive(asked, 2)
-    bent.request(STEERING, -0.05)
-    assert drive(bent, 4, start=2_010_000).yaw_rate == pytest.approx(0, abs=1e-6)

@@ -2,15 +2,13 @@
 
 import logging
 import math
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.assets.car import KIWI
 from dodo_dsl.opendlv.message_set import MessageSet
 from services.dynamic_model.drives import GRAVITY
-from services.dynamic_model.model import BodyMotion, KiwiDrive, Vehicle
+from services.dynamic_model.model import BodyMotion
 from services.dynamic_model.service import DynamicModel
 from tests.services.dynamic_model.test_service import AXLES, PEDALS, SPEED, service
 
@@ -140,15 +138,3 @@ def test_what_is_no_number_is_ignored_and_no_drive_moves_sideways(drive: str, ca
         "ignored a GroundMotionRequest of 0.0, -inf, 0.0",
         "no drive moves sideways: vy of 0.5 m/s, and of all others, has no effect",
     ]
-
-
-def test_a_car_without_tyres_is_steered_all_the_same() -> None:
-    for car in (replace(KIWI, cornering_front=0.0), replace(KIWI, cornering_rear=0.0, gain_forward=0.0)):
-        assert Vehicle(KiwiDrive(car)).follow(BodyMotion(1e308, 0.0, 1e308))
-
-
-def test_wheels_that_slip_turn_as_fast_as_others() -> None:
-    model = service(**WHEELS, slip=0.3)
-    hand(model, vx=0.5)
-    assert after(model, 1.0).vx == pytest.approx(0.35)
-    assert [reading.value for reading in model.vehicle.odometry] == pytest.approx([0.5 / 0.0325] * 2)

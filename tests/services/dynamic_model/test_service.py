@@ -6,7 +6,7 @@ import pytest
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.spec.manifest import load_manifest as load
 from services.base import Context, Output
-from services.base.flags import FlagsError, load_manifest, parse
+from services.base.flags import load_manifest, parse
 from services.dynamic_model.service import DynamicModel
 
 SECOND = 1_000_000
@@ -20,22 +20,6 @@ MANIFEST = load_manifest(MANIFEST_FILE.parent)
 def service(**flags: object) -> DynamicModel:
     words = [f"--{name}={value}" for name, value in {"cid": 128, "frame-id": 3, **flags}.items()]
     return DynamicModel(Context("dynamic-model", parse(MANIFEST, words), MessageSet.standard()))
-
-
-def test_requests_move_the_body_that_its_output_tells() -> None:
-    model, messages = service(), MessageSet.standard()
-    assert model.period == 10_000
-    model.inputs[PEDAL, None](messages.type(PEDAL)(position=0.1), 0)
-    model.inputs[STEERING, None](messages.type(STEERING)(groundSteering=0.1), 0)
-    for now in range(0, 3_000_001, 10_000):
-        (output,) = model.update(now)
-    assert isinstance(output, Output)
-    state = output.message
-    assert (state.DESCRIPTOR.full_name, output.sender_stamp) == ("opendlv.sim.KinematicState", 3)
-    motion = model.vehicle.motion
-    assert [state.vx, state.vy, state.yawRate] == pytest.approx([motion.vx, motion.vy, motion.yaw_rate])
-    assert [state.vz, state.rollRate, state.pitchRate] == [0, 0, 0]
-    assert state.vx > 0.6 and state.yawRate > 0.1
 
 
 def test_another_car(tmp_path: Path) -> None:
@@ -128,13 +112,6 @@ def test_a_bicycle_by_speed_and_one_by_acceleration() -> None:
         for now in range(0, 6_000_001, 10_000):
             (output,) = model.update(now)
         assert output.message.vx == pytest.approx(speed, rel=1e-3)
-
-
-def test_flags_of_another_drive_are_refused() -> None:
-    with pytest.raises(FlagsError, match=r"^--track is for --drive=differential$"):
-        service(drive="bicycle", track=0.2)
-    with pytest.raises(FlagsError, match=r"^--yaw-rate-id is for --odometry=true$"):
-        service(**{"yaw-rate-id": 4})
 
 
 def test_the_condition_of_other_drives() -> None:

@@ -81,12 +81,6 @@ def test_noise_has_its_deviation_and_bias_and_comes_again_with_its_seed() -> Non
     assert statistics.stdev(north) == pytest.approx(0.5, abs=0.06)
 
 
-def test_noise_of_one_reading_does_not_depend_on_the_others() -> None:
-    alone = service(geolocation="false", magnetic_field="false", acceleration_noise=0.2)
-    beside = service(angular_velocity="false", acceleration_noise=0.2)
-    assert [outputs[1].message for outputs in drive(alone)] == [outputs[0].message for outputs in drive(beside)]
-
-
 def test_what_is_no_motion_is_ignored() -> None:
     sensor = service()
     hand(sensor, FRAME, 0, 0, x=1.0)

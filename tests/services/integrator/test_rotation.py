@@ -8,25 +8,10 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from dodo_dsl.opendlv.attitude import quaternion
-from services.integrator.model import angles, displacement, multiply, rotate, turn
+from services.integrator.model import angles, displacement, rotate, turn
 
 rates = st.tuples(*[st.floats(-20, 20)] * 3)
 velocities = st.tuples(*[st.floats(-2, 2)] * 3)
-
-
-@given(st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3))
-def test_angles_are_yaw_then_pitch_then_roll(roll: float, pitch: float, yaw: float) -> None:
-    parts = multiply(multiply(quaternion(0, 0, yaw), quaternion(0, pitch, 0)), quaternion(roll, 0, 0))
-    assert quaternion(roll, pitch, yaw) == pytest.approx(parts, abs=1e-12)
-
-
-@pytest.mark.parametrize("angle", [0.0499999, 0.05, 0.0500001, 1e-9, 0.0])
-def test_small_angles_join_the_closed_form_without_a_step(angle: float) -> None:
-    radius = 1 / angle if angle else math.inf
-    x, y, z = displacement((1, 0, 0), (0, 0, angle), 1)
-    assert z == 0
-    assert x == pytest.approx(radius * math.sin(angle) if angle else 1.0, rel=1e-14)
-    assert y == pytest.approx(radius * 2 * math.sin(angle / 2) ** 2 if angle else 0.0, rel=1e-14)
 
 
 @settings(deadline=None)

@@ -1,13 +1,10 @@
 import math
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
 from dodo_dsl.opendlv import odvd
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
-from dodo_dsl.opendlv.recording import read_envelopes
 from services.base import Context, Flags, Output, UnusableMessageError
 from services.integrator.service import OLD_FRAME, Integration
 
@@ -65,11 +62,3 @@ def test_the_command_reset_and_no_other() -> None:
         (output,) = body.update(1_000_000)
         assert isinstance(output, Output)
         assert output.message.y == pytest.approx(y)
-
-
-def test_real_frames_of_set_09_have_this_layout(shared_data: Callable[[str], Path]) -> None:
-    messages = MessageSet(odvd.load(OLD_FRAME))
-    payloads = [e.payload for e in read_envelopes(shared_data("sim-2023-04-27.rec")) if e.data_type == 1001]
-    frames = [messages.decode(1001, payload) for payload in payloads]
-    assert len(frames) > 100
-    assert [messages.encode(frame) for frame in frames] == payloads

@@ -46,15 +46,6 @@ def test_each_ray_meets_what_shapely_says(bodies, first, part, rays, reach):
     assert np.allclose(found[sure], farther[sure], atol=1e-7)
 
 
-@given(BODIES, COORDINATES, COORDINATES, ANGLES, st.integers(2, 400))
-def test_each_ray_meets_what_single_rays_do(bodies, x, y, first, rays):
-    """On a segment or on its end, too: corners of bodies are where sensors may be."""
-    origin, directions = np.array([x, y]), unit(first + math.tau / rays * np.arange(rays))
-    cut = Cut.of([(body, False) for body in bodies])
-    single = cut.distances(np.tile(origin, (rays, 1)), directions, 9.0)
-    assert np.array_equal(cut.scan(origin, directions, math.tau / rays, 9.0), single)
-
-
 def along_triangles(triangles, origin, angles):
     """The distance on each ray in space to the nearest of the triangles (T, 3, 3), by Cramer's rule."""
     rays, (a, b, c) = np.column_stack([unit(angles), np.zeros(len(angles))])[:, None], triangles.swapaxes(0, 1)
@@ -120,13 +111,3 @@ def room(write_map):
 )
 def test_ranges(about, expected, room):
     assert Scanner(room, Lidar(**about)).ranges(ORIGIN, {}).tolist() == pytest.approx(expected, rel=1e-6)
-
-
-def test_noise_has_its_deviation_and_comes_again_with_its_seed(room):
-    def scans(*seed):
-        scanner = Scanner(room, Lidar(rays=1000, noise=0.03), *seed)
-        return np.array([scanner.ranges(ORIGIN, {}) for _ in range(20)])
-
-    errors = scans(1) - Scanner(room, Lidar(rays=1000)).distances(ORIGIN, {})
-    assert errors.std() == pytest.approx(0.03, rel=0.03) and abs(errors.mean()) < 1e-3
-    assert [np.count_nonzero(scans(1) == scans(*seed)) > 20 for seed in ((1,), (2,), (1, 1))] == [True, False, False]

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
@@ -11,20 +10,6 @@ from services.object_detection.score import Counts, CountsByClass, compare
 A, B, FAR = Box(0, 0, 0.1, 0.1), Box(0.3, 0, 0.1, 0.1), Box(0.8, 0.8, 0.1, 0.1)
 LABELS = ("yellow", "blue", "orange")
 counts = st.integers(0, 1000)
-
-
-@given(counts, counts, counts)
-def test_precision_recall_and_f1_are_those_of_the_thesis(hits: int, false: int, missed: int) -> None:
-    counts = Counts(hits, false, missed)
-    p, r, f1 = counts.precision, counts.recall, counts.f1
-    assert p == (hits / (hits + false) if hits + false else None)
-    assert r == (hits / (hits + missed) if hits + missed else None)
-    if p and r:
-        assert f1 == pytest.approx(2 * p * r / (p + r))
-    elif hits + false + missed:
-        assert f1 == 0.0
-    else:
-        assert f1 is None
 
 
 def test_a_class_only_pairs_with_itself() -> None:
@@ -55,13 +40,6 @@ def test_parts_join_by_detection_id_whatever_their_order() -> None:
         LabelledBox("", FAR),
         LabelledBox("type 2", A),
     ]
-
-
-def test_of_one_detection_the_first_word_counts() -> None:
-    detections = Detections()
-    for value in (A, B, B, "yellow", "blue", TypeNumber(1), TypeNumber(2)):
-        detections.add(0, value)
-    assert (detections.labelled(), detections.repeated) == ([LabelledBox("yellow", A)], 2)
 
 
 def coco_by_class(

@@ -31,9 +31,3 @@ def test_the_longest_gap_against_numpy(answers: list[float], begin: float, end: 
 def test_a_first_answer_within_the_start_up_begins_the_judged_time() -> None:
     assert Silence(2.0, answers=[2.0, 3.0]).gap(0.0, 4.0) == Gap(2.0, 3.0)
     assert Silence(1.9, answers=[2.0, 3.0]).gap(0.0, 4.0) == Gap(0.0, 2.0)
-
-
-def test_frames_that_expect_nothing_count_only_when_answered() -> None:
-    frames = [JudgedFrame(0, "", 0.0, False), JudgedFrame(1, "", None, False), JudgedFrame(2, "", None)]
-    assert Silence(frames=frames).unanswered()[:2] == (2, 1)
-    assert Silence(frames=[JudgedFrame(1, "", None, False)]).unanswered().share is None

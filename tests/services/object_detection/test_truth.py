@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.assets.problem import InputError
 from services.object_detection.boxes import Box, FrameKey, LabelledBox, load_truth
-from tests.services.process import ROOT
 
 COCO = {
     "images": [
@@ -97,11 +96,6 @@ def test_what_is_refused(tmp_path: Path, path: tuple[Any, ...], value: Any, said
     assert str(raised.value).startswith(f"{file}{said}")
 
 
-def test_more_than_one_picture_for_every_frame_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"has 2 images, expected one for all frames; see truth-frames$"):
-        load_truth(write(tmp_path, COCO), "one")
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -131,10 +125,3 @@ def test_any_json_is_a_truth_or_one_sentence(tmp_path_factory: pytest.TempPathFa
     path = write(tmp_path_factory.getbasetemp(), document)
     with pytest.raises(InputError, match=r"truth\.json(:\d+:\d+)?: "):
         load_truth(path, "number")
-
-
-def test_the_registry_has_truths_that_can_be_used() -> None:
-    paths = sorted((ROOT / "tests_registry" / "truths").glob("*.json"))
-    assert paths
-    for path in paths:
-        assert load_truth(path, "one").labels() == ["blue", "yellow"]

@@ -2,10 +2,7 @@
 
 import math
 
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from services.projected_truth.path import MeasuredPath
 from services.scene.camera import CameraPose
@@ -38,23 +35,3 @@ def test_after_the_last_pose_it_moves_on_for_a_second() -> None:
     assert where(made.at(75_000)) == (pytest.approx(0.15), 0.0)
     assert made.at(50_000 + SECOND + 1) is None
     assert where(path((0, 0.3, 0.0)).at(20_000)) == (0.3, 0.0)
-
-
-def test_where_it_is_not_known() -> None:
-    assert MeasuredPath().at(0) is None
-    assert path((50_000, 0.1, 0.0)).at(49_999) is None, "before the first pose"
-    assert path((0, 0.0, 0.0), (SECOND + 1, 0.1, 0.0)).at(10) is None, "poses too far apart"
-
-
-def test_poses_that_come_late_or_twice_are_ignored() -> None:
-    made = path((0, 0.0, 0.0), (50_000, 0.1, 0.0), (40_000, 9.0, 0.0), (50_000, 9.0, 0.0))
-    assert where(made.at(40_000)) == (pytest.approx(0.08), 0.0)
-    assert made.reaches(50_000) and not made.reaches(50_001)
-
-
-@given(st.lists(st.integers(1, SECOND), min_size=1, max_size=8), st.floats(0, 1))
-def test_what_moves_on_a_line_stays_on_it(gaps: list[int], share: float) -> None:
-    times = np.cumsum([0, *gaps]).tolist()
-    made = path(*((time, 1e-7 * time, 0.0) for time in times))
-    time = round(share * times[-1])
-    assert where(made.at(time)) == (pytest.approx(1e-7 * time, abs=1e-9), pytest.approx(0.0))

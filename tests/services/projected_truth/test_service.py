@@ -92,12 +92,6 @@ def test_it_says_what_a_virtual_camera_at_the_same_place_says(resources: ExitSta
     assert projection.update(BEGIN + 50_000) == [], "each picture has its boxes once"
 
 
-def test_a_camera_that_stands_still_needs_no_frames(resources: ExitStack) -> None:
-    projection = Projection(resources, "--x=-0.7", "--y=0.04")
-    projection.picture(BEGIN)
-    assert len(projection.update(BEGIN + 5_000)) == len(drawn(resources, -0.7, 0.04, 0.0))
-
-
 def test_a_pose_that_does_not_come_is_waited_for_and_then_extrapolated(resources: ExitStack) -> None:
     projection = Projection(resources, "--frame-id=4")
     projection.frame(BEGIN, -0.8)
@@ -133,18 +127,6 @@ def test_other_bodies_are_where_they_were_at_the_picture(resources: ExitStack, w
         boxes.append([each.message for each in projection.update(begin + 46_000)])
     assert [message.property for message, *_ in (each[1:] for each in boxes)] == ["car", "car"]
     assert boxes[0][2].x - boxes[1][2].x == pytest.approx(boxes[0][2].width / 4, rel=0.2), "0.25 m to the left"
-
-
-def test_a_camera_that_comes_later_is_found_and_one_that_goes_is_no_error(resources: ExitStack) -> None:
-    projection = Projection(resources, "--x=-0.7")
-    name = projection.memory.name
-    projection.memory.close()
-    assert projection.update(BEGIN + 1_000) == []
-    with SharedMemory.create(name, 64) as memory:
-        assert projection.update(BEGIN + 200_000) == []
-        with memory.lock():
-            memory.stamp(BEGIN + 210_000)
-        assert projection.update(BEGIN + 215_000)
 
 
 class SteppedClock(RealTimeClock):

@@ -63,13 +63,6 @@ def test_a_sensor_is_where_the_vehicle_carries_it(x, y, yaw, side):
     assert found == pytest.approx(min(exits), rel=1e-9)
 
 
-def test_a_sensor_inside_a_block_measures_nothing(room):
-    inside = Place(1.0, 0.3, 0.0, 0.0)
-    assert seen(room, Device(), inside) == 0.0
-    assert Device().reading(0.0, NO_ERRORS) == 0.03
-    assert seen(room, Device(), inside, z=1.2) == pytest.approx(1.0), "above it"
-
-
 def test_the_range_of_an_ultrasonic_sensor():
     device = Device()
     assert [device.reading(d, NO_ERRORS) for d in (0.01, 0.03, 1.0, 6.0)] == [0.03, 0.03, 1.0, 6.0]
@@ -87,30 +80,9 @@ def test_the_voltage_of_an_infrared_sensor():
     assert replace(device, far=0.8).reading(0.6, NO_ERRORS) == pytest.approx(0.2)
 
 
-def test_too_near_an_infrared_sensor_is_taken_for_far():
-    assert INFRARED.reading(0.01, NO_ERRORS) == pytest.approx(np.interp(0.75, [0.6, 1.0], [0.22, 0.13]))
-
-
 @pytest.mark.parametrize(
     "text", ["", "3.0", "3,0.1", "1,0.1;2,0.2", "2,0.2;1,0.1", "2,0;1,1", "nan,1;1,2", "2,1;2,3", "a,b"]
 )
 def test_a_curve_falls(text):
     with pytest.raises(CurveError):
         Curve.parse(text)
-
-
-@pytest.mark.thorough
-def test_noise_has_its_deviation_and_its_seed(room):
-    def readings(seed, **errors):
-        finder = RangeFinder(room, [Sensor(3), Sensor(5)], Device(**errors), seed)
-        return np.array([finder.readings(ORIGIN, {}) for _ in range(1500)])
-
-    noisy = readings(1, noise=0.02)
-    assert noisy.mean(axis=0) == pytest.approx([2.0, 2.0], abs=0.003)
-    assert noisy.std(axis=0) == pytest.approx([0.02, 0.02], rel=0.06)
-    assert abs(np.corrcoef(noisy.T)[0, 1]) < 0.08, "sensors err by themselves"
-    assert np.array_equal(noisy, readings(1, noise=0.02)) and not np.array_equal(noisy, readings(2, noise=0.02))
-    wrong = readings(1, outliers=0.1)
-    assert (wrong != 2.0).mean() == pytest.approx(0.1, abs=0.02)
-    assert wrong[wrong != 2.0].mean() == pytest.approx((0.03 + 6.0) / 2, rel=0.1)
-    assert np.array_equal(readings(1, noise=0.02, outliers=0.1)[wrong == 2.0], noisy[wrong == 2.0])

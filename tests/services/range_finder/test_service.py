@@ -6,9 +6,7 @@ from typing import Any
 
 import pytest
 
-from services.base.flags import FlagsError, load_manifest, parse
 from tests.services.built import built, hand, refusal
-from tests.services.process import ROOT
 
 FRAME, VOLTAGE = "opendlv.sim.Frame", "opendlv.proxy.VoltageReading"
 WALL = {"obstacles": [{"name": "wall", "lines": [[2, -9, 2, 9]]}]}
@@ -80,13 +78,3 @@ def test_silence_and_frames_that_are_none(folder: Path) -> None:
 )
 def test_flags_that_do_not_fit_are_refused(folder: Path, flags: list[str], said: str) -> None:
     assert said in refusal("range_finder", f"--map-path={folder}", *flags)
-
-
-@pytest.mark.parametrize("flag", ["id=-1", "id=a", "id=1.5", "x=0,b", "yaw=0,361"])
-def test_items_of_lists_are_checked(flag: str) -> None:
-    words = {"id": "0", **dict([flag.split("=")])}
-    with pytest.raises(FlagsError, match=f"--{flag.split('=', 1)[0]}=.* is (not a|out of range)"):
-        parse(
-            load_manifest(ROOT / "services/range_finder"),
-            [f"--{n}={v}" for n, v in {"cid": "1", "map-path": "m", **words}.items()],
-        )

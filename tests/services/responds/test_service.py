@@ -83,15 +83,6 @@ def test_frames_without_an_answer_in_time_are_told_with_the_longest_run() -> Non
     assert (verdict.outcome, values(verdict)["late"]) == ("failed", 1)
 
 
-def test_two_answers_to_a_frame_answer_no_other_and_the_future_none() -> None:
-    with judge("--freq=10", "--max-time=2") as it:
-        for step in range(10):
-            answer(it, BEGIN + step // 2 * 2 * S // 10, step / 10 + 0.01)
-        answer(it, BEGIN + 18 * S // 10, 0.92)
-        verdict = decided(it, 0.95)
-    assert values(verdict)["share"] == 0.5 and values(verdict)["late"] == 1
-
-
 def test_values_beyond_bounds_and_none_at_all_fail() -> None:
     with judge("--freq=10", "--max-time=2") as it:
         for step, value in enumerate((0.1, -0.6, 0.7, float("nan"))):
@@ -173,24 +164,6 @@ def test_frames_that_were_not_shown_need_no_answer(is_copied: bool, tmp_path: Pa
         verdict = decided(it, 4)
     assert (values(verdict)["frames"], values(verdict)["late"]) == (15, 0)
     assert values(verdict)["share"] == 1.0
-
-
-def test_a_recording_with_fewer_frames_than_answers_are_asked_for_is_no_verdict(tmp_path: Path) -> None:
-    flags = f"--rec={pictures(tmp_path, 0.0, 0.1, 0.2)}", "--video-sender=2", "--min-frames=3"
-    with (
-        built("responds", *ANSWER[:2], *flags) as it,
-        pytest.raises(UnjudgeableError, match=r"^only 2 frames came before .* 3 have to be"),
-    ):
-        it.begin(BEGIN)
-        hide(it, BEGIN + S, BEGIN + S + S // 10)
-        decided(it, 4)
-
-
-def test_frames_that_came_are_enough_also_if_none_is_answered() -> None:
-    with built("responds", *ANSWER[:2], "--freq=10", "--max-time=2", "--min-frames=20") as it:
-        it.begin(BEGIN)
-        it.update(BEGIN + 2 * S + 1)
-        assert it.verdict and it.verdict.reason.endswith("GroundSteeringRequest/0 came within 2.00 s")
 
 
 @pytest.mark.parametrize(("sent", "is_kept"), [(0.3, True), (0.29999998, True), (0.30000004, False), (0.31, False)])

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from services.scene.camera import MOST, CameraMotion, CameraPose, Pinhole, motion_between, still
+from services.scene.camera import CameraMotion, CameraPose, Pinhole, motion_between
 from services.scene.render import Renderer
 from services.scene.scene import load_scene
 from services.virtual_camera.optics import Optics
@@ -44,18 +44,6 @@ def test_a_turning_camera_smears_edges_as_wide_as_it_turns(cube_at):
     assert len(edges[1]) == pytest.approx(2 * turned, rel=0.35)
     middle = (edges[1].min() + edges[1].max()) / 2
     assert middle == pytest.approx(79.5, abs=1.5)  # the shutter is open as long before as after
-
-
-def test_what_does_not_move_is_sharp(cube_at):
-    scene, pose = load_scene(cube_at([3, 0, 0, 0])), CameraPose.at(0, 0, 0.5)
-    assert np.array_equal(expose(scene, still(pose), 0.1), expose(scene, still(pose), 0.0))
-
-
-def test_the_number_of_pictures_grows_with_the_motion_to_a_limit():
-    camera, pose = Pinhole(640, 480, 0.85), CameraPose.at(0, 0, 0)
-    steps = [CameraMotion(pose, np.zeros(3), np.array([0, 0, spin])).steps(camera, 0.02) for spin in (0, 0.3, 1, 100)]
-    assert steps == sorted(steps)
-    assert (steps[0], steps[-1]) == (1, MOST)
 
 
 @pytest.mark.parametrize(("blur", "count"), [(0, 1), (3, 1), (3.1, 3), (15, 3), (15.1, 5), (27.1, 7), (1000, 7)])

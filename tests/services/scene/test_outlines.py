@@ -12,7 +12,6 @@ from hypothesis.extra.numpy import arrays
 
 from services.scene.outlines import Cut, Outlines, Place, slice_mesh
 
-INSTANCE = [2.0, 0.0, 0.0, 0.0]
 COORDINATES = st.integers(-400, 400).map(lambda number: number / 100)
 ANGLES = st.floats(-math.pi, math.pi)
 
@@ -76,15 +75,6 @@ def test_meshes_are_cut_as_trimesh_cuts_them(height):
         assert ours.hausdorff_distance(theirs) < 1e-9
 
 
-def test_what_is_above_and_below_is_not_seen(cube_at):
-    path = cube_at(INSTANCE, height=0.2)
-    look = (np.zeros((1, 2)), np.array([[1.0, 0.0]]), 6.0)
-    assert [Outlines(path).at(z).distances(*look)[0] for z in (0.0, 0.1, 0.19, 0.2, 0.3)] == pytest.approx(
-        [1.5, 1.5, 1.5, np.inf, np.inf]
-    )
-    assert not Outlines(path).at(0.0).contains(np.zeros((1, 2))).any(), "a sensor on the floor is not in the floor"
-
-
 def test_blocks_turn_as_the_camera_draws_them(write_map):
     block = {
         "name": "b",
@@ -121,11 +111,3 @@ def test_what_moves_stands_at_its_frame_and_the_vehicle_is_not_seen(write_map, c
     assert not list(outlines.bodies_at(0.5, {}))
     (gone,) = outlines.bodies_at(0.5, {4: Place(5.0, 0.0, 3.0, 0.0)})
     assert not len(gone.starts), "it flies above"
-
-
-def test_what_has_no_length_is_not_there():
-    point, wall = np.ones((1, 2, 2)), np.array([[[2.0, -1.0], [2.0, 1.0]]])
-    cut = Cut.of([(point, False), (np.concatenate([point, wall]), False)])
-    look = (np.zeros((1, 2)), np.array([[1.0, 0.0]]))
-    assert (len(cut.first), len(cut.starts)) == (1, 1)
-    assert cut.distances(*look, 6.0).tolist() == cut.nearest(*look, 0.4, 6.0).tolist() == [2.0]

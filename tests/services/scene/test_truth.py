@@ -9,7 +9,7 @@ from dodo_dsl import package_data
 from services.scene.camera import CameraPose, Pinhole, still
 from services.scene.lens import Distortion
 from services.scene.render import Renderer
-from services.scene.scene import SceneOptions, load_scene
+from services.scene.scene import load_scene
 from services.scene.truth import SceneTruth, TrueBox, TruthLimits, classes_of
 from services.virtual_camera.optics import Optics
 
@@ -84,12 +84,6 @@ def test_what_hides_a_model_takes_from_its_visible_share(cube_at):
     ] == [1]
 
 
-def test_a_model_behind_a_wall_or_the_camera_has_no_box(write_map):
-    wall = {"name": "wall", "dimension": [0.2, 9, 4], "color": [0, 0, 1], "instances": [[3, 0, 1, 0]]}
-    cubes = {"name": "cube", "file": "cube.obj", "color": [1, 0, 0], "instances": [[6, 0, 0, 0], [-4, 0, 0, 0]]}
-    assert boxes(write_map({"model": [cubes], "block": [wall]}), CameraPose.at(0, 0, 0.5)) == []
-
-
 def test_a_cut_model_has_a_cut_box_and_the_share_that_is_inside(cube_at):
     left = 2 * 320 / FOCAL  # where the picture ends at 2 m
     (box,) = boxes(cube_at([2.5, left, 0, 0]), CameraPose.at(0, 0, 0.5))
@@ -99,33 +93,12 @@ def test_a_cut_model_has_a_cut_box_and_the_share_that_is_inside(cube_at):
     assert boxes(cube_at([2.5, left, 0, 0]), CameraPose.at(0, 0, 0.5), TruthLimits(0.8, 0)) == []
 
 
-def test_a_model_that_reaches_behind_the_camera_is_cut_there(cube_at):
-    (box,) = boxes(cube_at([0, 30.2, 0, 0], half=30, height=5), CameraPose.at(0, 0, 1.0))
-    assert edges(box)[0] == 0
-    assert edges(box)[1] <= 320
-
-
-@pytest.mark.parametrize(("height", "there"), [(10, True), (11.5, False)])
-def test_a_tiny_model_has_no_box(cube_at, height, there):
-    folder, distance = cube_at([5.05, 0, 0, 0], half=0.05, height=0.1), 5.0
-    tall = FOCAL * 0.1 / distance
-    assert tall == pytest.approx(10.58, abs=0.01)
-    assert bool(boxes(folder, CameraPose.at(0, 0, 0.05), TruthLimits(0.25, height))) is there
-
-
 def test_classes_are_those_written_or_the_models_own_names():
     names = ["cone_yellow", "cone_yellow", "cone_blue", ""]
     assert classes_of([], names) == {"cone_yellow": "cone_yellow", "cone_blue": "cone_blue"}
     assert classes_of(["cone_blue=blue", "cone_yellow"], names) == {"cone_blue": "blue", "cone_yellow": "cone_yellow"}
     with pytest.raises(ValueError, match="no model 'cone_red' in the map, which has cone_yellow, cone_blue"):
         classes_of(["cone_red=red"], names)
-
-
-def test_clutter_has_no_boxes_and_changes_no_numbers():
-    pose = CameraPose.at(0, 0, 0.1, yaw=math.pi / 2)
-    plain, cluttered = (boxes(STRAIGHT, pose, TruthLimits(), options=SceneOptions(clutter=n, seed=2)) for n in (0, 80))
-    assert plain == cluttered
-    assert len(plain) > 8
 
 
 @pytest.mark.slow

@@ -9,8 +9,6 @@ evo is no dependency: it has the GPL, and 200 MB come with it (pandas, matplotli
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from services.trajectory_error import model
 from tests.services.trajectory_error.test_service import decided, values
@@ -51,10 +49,3 @@ def test_the_nearest_is_the_earlier_of_two_and_time_is_counted_from_pair_to_pair
     assert found.tolist() == [0, -1, 0, 1, 1, 2, -1]
     steps = [100_000, 100_000, 100_000, 250_000, 50_000, 100_000, 100_000]
     assert model.ends(steps, 300_000).tolist() == [0, 3, 5] and model.ends([1] * 7, 3).tolist() == [0, 3, 6]
-
-
-@given(st.integers(0, 2**32))
-def test_points_on_a_line_leave_open_how_they_are_turned(seed: int) -> None:
-    points, others = np.random.default_rng(seed).normal(0, 2, (2, 12, 3))
-    assert not model.is_open(points, others)
-    assert model.is_open(points[:1] + np.arange(12)[:, np.newaxis] * points[1], others)

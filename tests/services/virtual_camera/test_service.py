@@ -149,14 +149,6 @@ def test_all_memories_hold_the_same_picture_and_time(camera):
     assert shot.sample_time == START + 7
 
 
-def test_frames_of_its_vehicle_count_and_the_rate_is_the_period(camera):
-    made = camera("--frame-id=4", "--freq=12.5")
-    assert set(made.service.inputs) == {("opendlv.sim.Frame", 4)}
-    assert made.service.period == 80_000
-    there, elsewhere = (made.shoot((0.0, y, 0.0), frame_id=4).argb for y in (0.0, 0.3))
-    assert not np.array_equal(there, elsewhere)
-
-
 def test_models_at_frames_move_with_them_but_for_the_own_one(camera, write_map):
     """A frame that is no place leaves them where they are."""
     folder = write_map({"model": [{"name": "car", "file": "cube.obj", "color": [1, 0, 0], "frames": [4, 0, 5]}]})
@@ -175,25 +167,6 @@ def test_models_at_frames_move_with_them_but_for_the_own_one(camera, write_map):
     widths = [o.message.width for shot in shots for o in shot.outputs if hasattr(o.message, "width")]
     assert properties == [["car"]] * 3
     assert widths[0] == widths[1] < widths[2]
-
-
-EVERYTHING = [
-    *("--noise=0.03", "--clutter=40", "--seed=8", "--shutter=0.03", "--distortion.k1=-0.2"),
-    *("--exposure=0.6", "--gain=1.5", "--lines=left", "--light.elevation=30", "--truth-sender=9"),
-]
-
-
-@pytest.mark.thorough
-def test_seed_and_time_alone_decide_what_is_drawn_by_lot(camera):
-    frames = [(0.0, 0.1, 0.0), (0.0, 0.13, 0.05)]
-    first = camera(*EVERYTHING).shoot(*frames)
-    later = camera(*EVERYTHING)
-    later.shoot((0.0, 0.9, 0.3), (0.1, 0.95, 0.4), now=START - 10 * STEP)
-    second = later.shoot(*frames)
-    for one, other in zip(first[:3], second[:3], strict=True):
-        assert np.array_equal(one, other)
-    assert first.outputs == second.outputs
-    assert not np.array_equal(first.argb, later.shoot(frames[-1], frames[-1], now=START + STEP).argb)
 
 
 def told(outputs: list[Output]) -> dict[int, dict[str, Any]]:

@@ -31,12 +31,6 @@ def test_the_boxes_hold_what_the_picture_shows(cube_at: Callable[..., Path], tmp
     assert edges == pytest.approx((columns.min(), columns.max() + 1, rows.min(), rows.max() + 1), abs=1.5)
 
 
-def test_the_vehicle_stands_where_its_flags_say(cube_at: Callable[..., Path], tmp_path: Path) -> None:
-    words = (f"--map-path={cube_at([4, 0, 0, 0])}", f"--output={tmp_path / 'snapshot.png'}", "--z=0.5", *SIZE)
-    widths = [snapshot(*words, *start)[1]["boxes"][0]["width"] for start in ((), ("--start-x=2",))]
-    assert widths[1] / widths[0] == pytest.approx(3.5 / 1.5, rel=1e-3)
-
-
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -52,8 +46,3 @@ def test_what_gives_no_snapshot(
     found, said = snapshot(*given, *words)
     assert found == 2 and sentence in said["error"]
     assert not (tmp_path / "snapshot.png").exists()
-
-
-def test_a_picture_that_cannot_be_written(cube_at: Callable[..., Path], tmp_path: Path) -> None:
-    code, said = snapshot(f"--map-path={cube_at([4, 0, 0, 0])}", f"--output={tmp_path / 'no' / 'where.png'}")
-    assert code == 1 and "No such file" in said["error"]

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from services.scene.camera import CameraPose
 from services.scene.render import Renderer
@@ -60,22 +59,6 @@ def test_a_model_at_a_frame_looks_like_one_that_stands_there(write_map: Write) -
         np.testing.assert_array_equal(moving.render(EYE), picture)
 
 
-def test_its_front_is_its_own_minus_y(write_map: Write) -> None:
-    it = renderer(write_map, model(frames=[0]))
-    drive(it, 0, 1.0, 2.0, 0.0, math.radians(90))
-    corners = it.bodies.outline(0)[0]
-    assert np.isclose(corners, [1.0, 2.3, 0.0]).all(axis=1).any(), "the tip, 0.3 m ahead along the frame's yaw"
-
-
-def test_frames_are_known_by_their_stamps_and_the_own_one_is_not_drawn(write_map: Write) -> None:
-    it = renderer(write_map, model(frames=[0, 3], instances=[[9, 9, 0, 0]]), model("cube", frames=[2, 4]), own=0)
-    assert it.bodies.stamps == (3, 2, 4)
-    assert it.bodies.names == ["car", "car", "cube", "cube"]
-    for stamp, spot in zip((3, 2, 4), SPOTS, strict=True):
-        drive(it, stamp, *spot)
-    assert [it.bodies.middles[n][:2].round(1).tolist() for n in (1, 2, 3)] == [[0.8, 0.1], [2.0, -0.6], [2.2, 0.9]]
-
-
 def test_true_boxes_move_along(write_map: Write) -> None:
     it = renderer(write_map, model("cube", instances=[[3, 0.8, 0, 0]]), model(frames=[7]))
     truth = SceneTruth(it, {"car": "car", "cube": "cube"}, TruthLimits())
@@ -86,10 +69,3 @@ def test_true_boxes_move_along(write_map: Write) -> None:
         assert truth.boxes(EYE) == SceneTruth(still, {"car": "car", "cube": "cube"}, TruthLimits()).boxes(EYE)
     drive(it, 7, -3.0, 0.0, 0.0, 0.0)
     assert [box.name for box in truth.boxes(EYE)] == ["cube"]
-
-
-@pytest.mark.parametrize("roll_and_pitch", [(0.3, 0.0), (0.0, -0.2)])
-def test_it_stands_upright(write_map: Write, roll_and_pitch: tuple[float, float]) -> None:
-    it = renderer(write_map, model(frames=[7]))
-    it.place(7, CameraPose.at(1, 0, 0, *roll_and_pitch, 0.5))
-    assert it.bodies.outline(0)[0][:, 2].min() == pytest.approx(0.0)

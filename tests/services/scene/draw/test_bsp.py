@@ -61,19 +61,6 @@ def test_a_place_is_drawn_after_what_lies_behind_it_and_before_what_hides_it(sce
             assert (number > at) == (far < 1)
 
 
-def test_each_leaf_comes_once_from_anywhere():
-    tree = Tree(boxes(3))
-    for eye in np.random.default_rng(1).uniform(-9, 9, (5, 3)):
-        leaves = [item for item in tree.back_to_front(eye) if isinstance(item, int)]
-        assert sorted(leaves) == list(range(tree.leaves))
-
-
-def test_without_faces_all_is_one_leaf():
-    tree = Tree([])
-    assert list(tree.back_to_front(np.zeros(3))) == [0]
-    assert tree.locate(np.ones((3, 3))).tolist() == [0, 0, 0]
-
-
 def test_a_box_is_centred_and_turned_as_opendlv_does():
     faces = box_faces((4.0, 2.0, 1.0), Instance((10.0, 0.0, 0.5), 0.5), WHITE)
     corners = np.concatenate([face.points for face in faces])

@@ -1,26 +1,14 @@
-import math
-
 import numpy as np
 import pytest
 
 from services.scene.camera import CameraPose
 from services.scene.render import Renderer
 from services.scene.scene import SceneOptions, load_scene
-from services.scene.shading import DIRECTION, Light, direction_of
+from services.scene.shading import Light
 
 
 def draw(folder, light, *pose, **angles):
     return Renderer(load_scene(folder, SceneOptions(light)), 64, 48, 1.0).render(CameraPose.at(*pose, **angles))
-
-
-def test_what_nobody_asks_for_is_the_usual_light():
-    assert Light.of_flags(None, None, None).on_blocks is False
-    assert Light.of_flags(None, None, 0.62).direction == pytest.approx(DIRECTION)
-
-
-def test_azimuth_counts_counter_clockwise_and_elevation_up():
-    assert direction_of(math.pi / 2, 0.0) == pytest.approx([0, 1, 0])
-    assert direction_of(0.0, math.pi / 4) == pytest.approx([math.sqrt(0.5), 0, math.sqrt(0.5)])
 
 
 def test_the_side_towards_the_light_is_bright_and_the_other_has_the_ambient_share(cube_at):

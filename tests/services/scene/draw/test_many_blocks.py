@@ -12,7 +12,6 @@ from services.scene import scene as scenes
 from services.scene import surfaces
 from services.scene.render import Renderer
 from services.scene.scene import load_scene
-from services.scene.surfaces import Face
 
 POSES = wander()[:6]
 
@@ -29,13 +28,6 @@ def test_hidden_faces_change_no_pixel(maze: Renderer, monkeypatch: pytest.Monkey
     for picture, pose in zip(found, POSES, strict=True):
         assert np.array_equal(picture, maze.render(pose))
     assert np.array_equal(found[0][..., 3], np.full((180, 320), 255))
-
-
-@pytest.mark.thorough
-def test_few_faces_are_drawn_of_many(maze: Renderer) -> None:
-    faces = [face for face in maze._tree.back_to_front(POSES[0].position) if isinstance(face, Face)]
-    for pose in POSES:
-        assert len(maze._faces.shown(maze.camera.view(pose), faces)) < len(faces) / 3
 
 
 def test_the_partition_cuts_few_faces(maze: Renderer) -> None:

@@ -33,20 +33,3 @@ def test_from_close_by_it_looks_as_drawn_anew(renderer, other):
     assert np.array_equal(first, renderer.render(AT))
     anew = renderer.render(other)
     assert ssim(moved, anew) > 0.98 > ssim(first, anew)
-
-
-def test_from_the_same_place_it_is_the_same(renderer):
-    out = np.empty((480, 640, 4), np.uint8)
-    first, again = (picture.copy() for picture in renderer.render_around(AT, [AT], out))
-    assert np.array_equal(first, again)
-
-
-def test_a_body_beside_the_camera_stays_where_it_is(cube_at):
-    """Its middle has no place in the picture."""
-    beside = Renderer(load_scene(cube_at([0, 0, 0.5, 0])), 64, 48, 1.0)
-    out = np.empty((48, 64, 4), np.uint8)
-    poses = CameraPose.at(0.05, 0.6, 0.5), CameraPose.at(0.1, 0.6, 0.5)
-    first, moved = (picture.copy() for picture in beside.render_around(poses[0], [poses[1]], out))
-    red = (first[..., 2] > first[..., 0] + 50).sum()
-    assert red > 100
-    assert np.array_equal(first, moved)

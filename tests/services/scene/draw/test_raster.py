@@ -1,8 +1,7 @@
 import cv2
 import numpy as np
-import pytest
 
-from services.scene.raster import fill, inset
+from services.scene.raster import fill
 
 
 def covered(polygon: np.ndarray, size: int) -> np.ndarray:
@@ -35,15 +34,3 @@ def test_polygons_are_neither_too_wide_nor_too_thin_on_average():
         extra += int(image.sum()) - int(covered(polygon, 64).sum())
         edge += float(np.linalg.norm(polygon - np.roll(polygon, 1, axis=0), axis=1).sum())
     assert abs(extra) < 0.06 * edge
-
-
-def test_insets_keep_thin_polygons_thin_but_there():
-    needle = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 0.2], [0.0, 0.2]])
-    part = inset(needle)
-    assert len(part) >= 3
-    assert 0 < np.ptp(part[:, 1]) < 0.2
-
-
-def test_a_polygon_without_an_area_is_left_alone():
-    point = np.array([[1.0, 1.0]] * 3)
-    assert inset(point) == pytest.approx(point)

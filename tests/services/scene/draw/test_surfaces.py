@@ -85,21 +85,6 @@ def test_a_fine_texture_is_sharp_when_near_and_its_mean_when_far():
     assert image[..., :3].mean() == pytest.approx(127.5, abs=1)
 
 
-def test_a_floor_seen_from_below_or_along_is_not_drawn():
-    camera, image = Pinhole(64, 48, 1.0), np.zeros((48, 64, 4), np.uint8)
-    draw_face(image, camera.view(CameraPose.at(0, 0, 0)), floor(4.0, 1.0, 64))
-    assert not image.any()
-
-
-@pytest.mark.parametrize("height", [480, 481])
-def test_the_horizon_is_in_the_middle_of_a_level_picture(height):
-    image = np.zeros((height, 64, 4), np.uint8)
-    draw_backdrop(image, Pinhole(64, height, 0.8).view(CameraPose.at(3, 4, 0.1, yaw=1.0)), SKY, GROUND)
-    sky = (image == SKY).all(axis=-1)
-    assert sky[: height // 2].all()
-    assert not sky[(height + 1) // 2 :].any()
-
-
 def test_a_roll_tilts_and_a_pitch_moves_the_horizon():
     camera, image = Pinhole(200, 200, math.radians(90)), np.zeros((200, 200, 4), np.uint8)
     draw_backdrop(image, camera.view(CameraPose.at(0, 0, 1, pitch=math.atan(0.5))), SKY, GROUND)
@@ -107,13 +92,6 @@ def test_a_roll_tilts_and_a_pitch_moves_the_horizon():
     draw_backdrop(image, camera.view(CameraPose.at(0, 0, 1, roll=math.atan(0.5))), SKY, GROUND)
     rows = [(image[:, column] == SKY).all(axis=-1).sum() for column in (0, 199)]
     assert rows == pytest.approx([150, 50], abs=1)  # the right side of the camera is low: the ground is there
-
-
-def test_large_pictures_are_made_smaller_and_odd_ones_keep_their_proportions():
-    texture = Texture(np.full((3000, 1500, 3), 77, np.uint8), 1)
-    assert texture.tiles[0].shape == (750, 375, 4)
-    assert all((tile == (77, 77, 77, 255)).all() for tile in texture.tiles)
-    assert texture.mean == (77.0, 77.0, 77.0)
 
 
 def test_what_is_no_picture_is_told(tmp_path):

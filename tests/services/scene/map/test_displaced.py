@@ -20,13 +20,6 @@ def test_each_model_stands_at_its_own_place_within_reach_on_the_ground() -> None
     assert abs(moved[:, :2].mean(axis=0)).max() < 0.02 and (moved[:, 2] == 0).all()
 
 
-@pytest.mark.thorough
-def test_the_reach_scales_and_the_seed_chooses() -> None:
-    assert offsets(0.1) == pytest.approx(2 * offsets(0.05))
-    assert (offsets(0.05) == offsets(0.05)).all() and (offsets(0.05) != offsets(0.05, seed=4))[:, :2].all()
-    assert (offsets(0.0) == 0).all()
-
-
 def test_clutter_stays_where_it_is() -> None:
     plain, moved = (load_scene(STRAIGHT, SceneOptions(clutter=20, displaced=r, seed=1)) for r in (0.0, 0.1))
     scenery = [[c.positions for c in scene.models if not c.name] for scene in (plain, moved)]

@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.opendlv.assets import map_file
-from dodo_dsl.opendlv.assets.map_file import MAX_BLOCKS, read_frames, read_map
+from dodo_dsl.opendlv.assets.map_file import MAX_BLOCKS, read_map
 from dodo_dsl.opendlv.assets.problem import InputError
 
 GOOD_MODEL = {"name": "cube", "file": "cube.obj", "color": [1, 0, 0.5], "instances": [[1, 2, 3, 0.5]]}
@@ -27,11 +26,6 @@ def test_a_map_is_read_from_its_folder_or_its_file(write_map):
         assert (model.name, model.file, model.paint) == ("cube", (folder / "cube.obj").resolve(), (1.0, 0.0, 0.5))
         assert (model.instances[0].position, model.instances[0].angle) == ((1.0, 2.0, 3.0), 0.5)
         assert (block.dimension, block.tile) == ((10.0, 10.0, 0.2), None)
-
-
-def test_what_stands_nowhere_is_left_out_with_its_files(write_map):
-    ghost = {"name": "kiwi", "file": "absent.obj", "textureFile": "absent.png", "frames": []}
-    assert read_map(write_map({"model": [ghost, changed(GOOD_MODEL, instances=[])]})).models == ()
 
 
 def test_a_model_stands_at_frames_and_instances(write_map):
@@ -64,37 +58,22 @@ BAD_MODELS = [
     ({"instances": [[1, 2, 3, "a"]]}, r'$.model[0].instances[0][3]: expected a number, found "a"'),
     ({"instances": [[1, 2, 3, True]]}, "$.model[0].instances[0][3]: expected a number, found true"),
     ({"instances": [[1, 2e9, 3, 0]]}, "$.model[0].instances[0][1]: expected a number between"),
-    ({"instances": {}}, "$.model[0].instances: expected a list, found {}"),
     ({"color": [1, 2, 3]}, "$.model[0].color: expected the numbers [r, g, b] between 0 and 1, found [1, 2, 3]"),
-    ({"color": "red"}, '$.model[0].color: expected the numbers [r, g, b], found "red"'),
     ({"color": ...}, "$.model[0]: 'color' or 'textureFile' is missing"),
     ({"file": ...}, "$.model[0]: 'file' is missing"),
     ({"file": 3}, "$.model[0].file: expected a string that is not empty, found 3"),
     ({"file": "cone.obj"}, "$.model[0].file: expected a file in "),
     ({"file": "../cube.obj"}, "$.model[0].file: expected a file inside the map's folder"),
     ({"file": "/etc/passwd"}, "$.model[0].file: expected a file inside the map's folder"),
-    ({"file": "a\0b"}, "$.model[0].file: expected "),
-    ({"textureFile": "no.png"}, "$.model[0].textureFile: expected a file in "),
-    ({"name": ...}, "$.model[0]: 'name' is missing"),
     ({"frames": 1}, "$.model[0].frames: expected a list, found 1"),
     (
         {"frames": [1.0]},
         "$.model[0].frames[0]: expected a sender stamp, a whole number from 0 to 4294967295, found 1.0",
     ),
-    ({"frames": [0, True]}, "$.model[0].frames[1]: expected a sender stamp"),
     ({"frames": [2**32]}, "$.model[0].frames[0]: expected a sender stamp"),
-    ({"frames": [-1]}, "$.model[0].frames[0]: expected a sender stamp"),
     ({"frames": [3, 3]}, "$.model[0].frames[1]: the sender stamp 3 appears twice"),
     ({"frames": list(range(101))}, "$.model[0].frames: 101 frames of a model, expected at most 100"),
 ]
-
-
-def test_frames_of_all_models_are_few(write_map):
-    models = [changed(GOOD_MODEL, name=name, frames=list(range(60 * n, 60 * n + 60))) for n, name in enumerate("ab")]
-    folder = write_map({"model": models})
-    with pytest.raises(InputError, match="120 frames of models, expected at most 100"):
-        read_map(folder)
-    assert read_frames(folder) == ()
 
 
 @pytest.mark.parametrize(("change", "message"), BAD_MODELS)
@@ -134,13 +113,6 @@ def test_a_bad_block_is_told_with_its_place(write_map, change, message):
 def test_what_is_no_map_is_told(write_map, text, message):
     with pytest.raises(InputError, match=message):
         read_map(write_map(text))
-
-
-def test_too_many_instances_are_refused(write_map, monkeypatch):
-    monkeypatch.setattr(map_file, "MAX_INSTANCES", 3)
-    folder = write_map({"model": [changed(GOOD_MODEL, instances=[[0, 0, 0, 0]] * 2)] * 2})
-    with pytest.raises(InputError, match="4 instances of models, expected at most 3"):
-        read_map(folder)
 
 
 def test_absent_odd_and_huge_files_are_refused(tmp_path):
@@ -202,8 +174,3 @@ def test_what_is_no_file_of_the_map_is_called_so(write_map, name, message):
         read_map(folder)
     assert str(raised.value).endswith(f'$.model[0].textureFile: {message} "{name}"')
     assert "did you mean" not in raised.value.hint
-
-
-def test_a_number_of_too_many_digits_names_no_function_of_python(write_map):
-    with pytest.raises(InputError, match=r"map\.json: a number has more than 4300 digits$"):
-        read_map(write_map(f'{{"model": [{"9" * 5000}]}}'))

@@ -81,12 +81,6 @@ def test_a_camera_shows_faces_in_the_colours_of_their_materials(folder, place, c
     assert list(formats.problems("map", folder, {}, {})) == []
 
 
-def test_the_colour_of_the_map_counts_before_materials(write_map, folder):
-    model = {"name": "cube", "file": "cube.obj", "color": [0, 1, 0], "instances": [[0, 0, 0, 0]]}
-    (folder / "my set.mtl").unlink()
-    assert draw(write_map({"model": [model]}, {"cube.obj": painted()}), 0, -6, 1.0, yaw=1.57)[238, 320, 1] > 100
-
-
 @pytest.mark.parametrize(
     ("library", "materials", "said"),
     [

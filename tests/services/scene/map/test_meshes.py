@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from services.scene.meshes import is_closed, load_obj, oriented
-from services.scene.shape import convex_parts, join, make_shape
+from services.scene.meshes import is_closed, load_obj
+from services.scene.shape import make_shape
 
 
 def cylinder(sides: int, radius: float = 0.5, height: float = 2.0) -> str:
@@ -41,13 +41,6 @@ def test_a_box_that_is_inside_out_is_turned(obj, cube_obj):
     assert trimesh.Trimesh(vertices, triangles, process=False).volume == pytest.approx(8.0)
 
 
-def test_corners_that_a_file_repeats_are_welded(obj, cube_obj):
-    again = cube_obj + "\n".join(
-        " ".join(["f", *(str(int(i) + 8) for i in s.split()[1:])]) if s[0] == "f" else s for s in cube_obj.splitlines()
-    )
-    assert load_obj(obj(again))[0].shape == (8, 3)
-
-
 def test_an_open_surface_shows_from_both_sides(obj):
     vertices, triangles = load_obj(obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"))
     normals = make_shape(vertices, triangles).normals
@@ -68,35 +61,3 @@ def test_a_fine_prism_that_is_not_round_keeps_its_corners(obj):
         f"v {float(p[1]) * 2} {p[2]} {p[3]}" if (p := s.split())[0] == "v" else s for s in cylinder(96).splitlines()
     ]
     assert len(load_obj(obj("\n".join(squashed)))[0]) == 192
-
-
-def test_joined_polygons_cover_what_the_triangles_did(obj):
-    vertices, triangles = load_obj(obj(cylinder(16)))
-    loops, normals, _ = join(vertices, triangles)
-    assert max(map(len, loops)) <= 8
-    assert len(loops) < 16 + 2 * 4
-    shape = make_shape(vertices, oriented(vertices, triangles))
-    cap = 8 * 0.25 * math.sin(math.pi / 8)
-    assert float(shape.areas[shape.normals[:, 2] > 0.9].sum()) == pytest.approx(cap)
-    assert float(shape.areas.sum()) == pytest.approx(2 * cap + 2.0 * 16 * math.sin(math.pi / 16))
-    assert np.linalg.norm(normals, axis=1) == pytest.approx(np.ones(len(loops)))
-
-
-def stepped(radii, heights) -> str:
-    """A tower of rings of sixteen corners."""
-    turns = [2 * math.pi * i / 16 for i in range(16)]
-    lines = [f"v {r * math.cos(t)} {r * math.sin(t)} {z}" for r, z in zip(radii, heights, strict=True) for t in turns]
-    for ring in range(len(radii) - 1):
-        lines += [
-            f"f {ring * 16 + i + 1} {ring * 16 + (i + 1) % 16 + 1} {ring * 16 + (i + 1) % 16 + 17} {ring * 16 + i + 17}"
-            for i in range(16)
-        ]
-    top = 16 * (len(radii) - 1)
-    lines += ["f " + " ".join(map(str, range(16, 0, -1))), "f " + " ".join(str(top + i + 1) for i in range(16))]
-    return "\n".join(lines)
-
-
-def test_a_cone_on_a_plate_has_two_convex_parts_and_a_box_one(obj, cube_obj):
-    assert [len(part) for part in convex_parts(*load_obj(obj(cube_obj)))] == [8]
-    parts = convex_parts(*load_obj(obj(stepped([4, 4, 3, 1], [0, 1, 1, 9]))))
-    assert sorted(len(part) for part in parts) == [32, 48]

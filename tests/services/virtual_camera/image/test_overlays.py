@@ -3,7 +3,7 @@ import pytest
 
 from dodo_dsl.opendlv.assets.problem import InputError
 from services.scene.scene import load_scene
-from services.virtual_camera.optics import Overlay, load_overlays
+from services.virtual_camera.optics import load_overlays
 
 
 def overlay(name="t.png", size=(0.5, 0.25), place=(0.25, 0.5)):
@@ -49,16 +49,3 @@ def test_overlays_that_make_no_sense_are_told(write_map):
     ):
         with pytest.raises(InputError, match=message):
             load_scene(write_map({"overlay": [entry]}))
-
-
-def test_an_overlay_of_a_broken_picture_is_told(write_map):
-    folder = write_map({"overlay": [overlay()]}, {"t.png": "no picture"})
-    with pytest.raises(InputError, match=r"t\.png: not a (readable )?image"):
-        laid(folder)
-
-
-def test_an_opaque_overlay_replaces_what_is_there():
-    picture = np.full((3, 3, 4), 50, np.uint8)
-    Overlay(np.full((1, 1, 4), (1, 2, 3, 255), np.uint8), 1, 1, (3, 3)).lay(picture)
-    assert picture[1, 1].tolist() == [1, 2, 3, 50]
-    assert (picture == 50).sum() == 33
