@@ -245,7 +245,7 @@ class Mesh:
     def load(cls, file: Path) -> Self:
         """Raises InputError."""
         vertices, triangles = load_obj(file)
-        return cls(vertices, triangles, is_closed(vertices, triangles))
+        return cls(vertices, triangles, is_closed(triangles))
 
     def at(self, height: float) -> Array:
         """The segments (n, 2, 2) at a height."""
