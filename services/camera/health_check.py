@@ -31,7 +31,6 @@ CONTRAST = 0.02
 
 
 def main(argv: Sequence[str], stdout: TextIO) -> int:
-    """Take a picture, check it and print the result."""
     try:
         flags = parse(load_manifest(Path(__file__).parent), [*argv, "--cid=1"])
         with interruptible():

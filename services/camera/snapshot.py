@@ -17,7 +17,6 @@ from services.camera.picture import Image
 
 
 def main(argv: Sequence[str], stdout: TextIO) -> int:
-    """Take a picture, write it and print the result."""
     return int(snapshot(argv, stdout, _take) != 0)
 
 

@@ -44,11 +44,9 @@ class FileCamera:
         self._pictures: Iterator[Image] = chain([first], pictures)
 
     def take(self) -> SharedPicture:
-        """The next picture, without a time."""
         return from_bgr(next(self._pictures), *self._size)
 
     def close(self) -> None:
-        """Close the file."""
         self._pictures = iter(())
 
 
@@ -79,7 +77,6 @@ def still(path: Path) -> Image | None:
 
 
 def filmed(path: Path) -> Iterator[Image]:
-    """The pictures of a video, as B, G, R."""
     capture: Any = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     try:
         if problem := too_large(*(round(capture.get(side)) for side in _SIDES)):
@@ -316,7 +313,6 @@ class RpiCamera:
         return False
 
     def _read_stderr(self) -> None:
-        """Keep the end of the program's log, which says why it ended."""
         assert self._process.stderr is not None
         with contextlib.suppress(ValueError):
             for line in self._process.stderr:

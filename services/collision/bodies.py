@@ -50,7 +50,6 @@ class MovedPath:
             self.poses.append((time, pose))
 
     def at(self, time: int) -> VehiclePose:
-        """The pose at a time between the first and the last one."""
         after = next(n for n, (known, _) in enumerate(self.poses) if known >= time)
         later, pose = self.poses[after]
         if later == time:
@@ -59,7 +58,6 @@ class MovedPath:
         return between(start, pose, (time - earlier) / (later - earlier))
 
     def forget(self, time: int) -> None:
-        """What was before a time is not asked for any more."""
         while len(self.poses) > 1 and self.poses[1][0] <= time:
             self.poses.pop(0)
 
@@ -76,7 +74,6 @@ class OtherBody:
 
     @property
     def was_seen(self) -> bool:
-        """Whether any frame of it came."""
         return self._seen is not None
 
     def first(self) -> float | None:
@@ -97,7 +94,6 @@ class OtherBody:
             self.hold()
 
     def take(self, time: int, pose: VehiclePose) -> None:
-        """A pose of the body itself."""
         self._seen = max(time, self._seen or time)
         self._its.add(time, pose)
 
@@ -140,7 +136,6 @@ def least_distance(own: Move, its: Move, box: VehicleBox, footprint: shapely.Geo
 
 
 def _seen_from(body: VehiclePose, other: VehiclePose) -> VehiclePose:
-    """A pose in the frame of a body."""
     cos, sin = math.cos(body.heading), math.sin(body.heading)
     x, y = other.x - body.x, other.y - body.y
     return VehiclePose(cos * x + sin * y, cos * y - sin * x, other.heading - body.heading)

@@ -51,7 +51,6 @@ class DriveMeasures:
         return speed
 
     def approach(self, margin: float) -> None:
-        """The vehicle came this close to a wall, in m; touching is a margin of zero."""
         self.wall_margin = margin if self.wall_margin is None else min(self.wall_margin, margin)
 
     def checks(self, track: Track, crossed: int, rest: float | None, has_bodies: bool) -> Iterator[Check]:
@@ -101,7 +100,6 @@ class Requests:
             self._last = max(now, self._last or 0)
 
     def elapse(self, now: int) -> None:
-        """Time passes without a request."""
         if self.came and self._last is None:
             self._last = now
         if self._last is not None:
@@ -113,12 +111,10 @@ class Requests:
 
     @property
     def missing(self) -> list[str]:
-        """Those that never came, by their short names."""
         return [name.rpartition(".")[2] for name in self.names if name not in self.came]
 
     @property
     def is_silent(self) -> bool:
-        """Whether none came at all."""
         return not self.came
 
     def fault(self, now: int, zero: int) -> str | None:
@@ -130,7 +126,6 @@ class Requests:
         return f"no request came between {begin:.2f} s and {end:.2f} s (at most {self._max_silence:g} s)"
 
     def checks(self) -> tuple[Check, ...]:
-        """The longest silence in s, if that has a limit."""
         if math.isinf(self._max_silence):
             return ()
         longest = self._longest / MICROSECONDS if self.came else None
@@ -154,7 +149,6 @@ class TrackEvaluator(Evaluator):
     def __init__(
         self, track: Track, box: VehicleBox, requests: Requests | None = None, bodies: Footprints | None = None
     ) -> None:
-        """``bodies`` are those that the vehicle must not touch, by the sender stamps of their frames."""
         super().__init__(track.max_time)
         self.track = track
         self.box = box
@@ -287,7 +281,6 @@ class TrackEvaluator(Evaluator):
         return self._verdict("failed", f"{fault}, although the vehicle {reason}", self._requests.is_silent)
 
     def _short(self) -> str | None:
-        """That the vehicle has not driven as far as it has to."""
         least, driven = self.track.min_distance, self._measures.distance
         return None if driven >= least else f"drove {told(driven, least)} m, expected at least {least:g} m"
 
@@ -357,7 +350,6 @@ class TrackEvaluator(Evaluator):
         return length_through(outline(self._last[1], self.box), [*left, *self.track.goal.values()])
 
     def _moment(self, prefix: str = "") -> dict[str, float | str | None]:
-        """Time (s) and place (m) of the newest pose."""
         if self._last is None:
             return {}
         time, pose = self._last

@@ -36,7 +36,6 @@ class Coverage:
 
     @property
     def gap(self) -> float:
-        """The length of the longest gap, in s."""
         return self.gap_end - self.gap_begin - self.hidden
 
 
@@ -219,7 +218,6 @@ class SignalMeasures:
     unanswered: int = 0
 
     def checks(self, limits: SignalLimits) -> tuple[Check, ...]:
-        """Each measure with its limit; one that has no value does not keep a limit."""
         shares = [("share", self.share, limits.share)] if limits.band is not None else []
         by_frames = (("frame-share", self.frame_share), ("sign-share", self.sign_share))
         wanted = (limits.frame_share, limits.sign_share)
@@ -398,7 +396,6 @@ class LateSamples:
         """From the time of each sample to its arrival, in us of the test."""
         self._first: Arrival | None = None
         self.newest: Arrival | None = None
-        """The newest sample that was believed."""
 
     def take(self, time: int, arrival: int | None) -> bool:
         """Whether a sample is late; nothing is before the time of the test is known (``arrival`` is None)."""
@@ -415,7 +412,6 @@ class LateSamples:
         return False
 
     def facts(self, zero: int) -> LateFacts:
-        """What was late, its times counted from ``zero`` us."""
         if self._first is None:
             return LateFacts()
         time, arrival = ((each - zero) / MICROSECONDS for each in self._first)

@@ -103,7 +103,6 @@ def _width(limits: SignalLimits) -> str:
 
 
 def _hole(check: Check, coverage: Coverage | None) -> str:
-    """What was left open, and how long that may be."""
     bound = check.bound
     if coverage is None:
         return f"{check.name} has no value ({bound})"
@@ -114,7 +113,6 @@ def _hole(check: Check, coverage: Coverage | None) -> str:
 
 
 def _late(late: LateFacts, begin: str = "; left out: ") -> str:
-    """Samples that were not believed, with the first."""
     count = f"{late.samples} sample{'' if late.samples == 1 else 's'}"
     if late.date:
         with_ = f"{count} with times of {late.date}, which are not the test's"
@@ -148,12 +146,10 @@ class Samples:
         return len(self._times)
 
     def add(self, time: int, value: float) -> None:
-        """One more sample."""
         self._times.append(time)
         self._values.append(value)
 
     def since(self, zero: int) -> tuple[Times, Values]:
-        """Copies of all, the times counted from `zero`."""
         return np.array(self._times, np.int64) - zero, np.array(self._values, np.float64)
 
 

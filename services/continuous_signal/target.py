@@ -77,7 +77,6 @@ class Signal:
     field: str
 
     def value(self, message: Any) -> float:
-        """The number that a message carries."""
         return float(getattr(message, self.field))
 
     def __str__(self) -> str:

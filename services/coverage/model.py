@@ -29,12 +29,10 @@ class Footprint:
 
     @property
     def reach(self) -> float:
-        """From the centre to the farthest point."""
         return math.hypot(self.length, self.width) / 2
 
     @property
     def thickness(self) -> float:
-        """Where it is thinnest."""
         return min(self.length, self.width) or self.length
 
     def holds(self, along: NDArray[np.float64], across: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -72,11 +70,9 @@ class CoverageGrid:
 
     @property
     def share(self) -> float:
-        """The share of the area that is covered."""
         return (self.cells - self.left) / self.cells
 
     def cover(self, pose: VehiclePose) -> None:
-        """The vehicle is here."""
         reach = self._footprint.reach
         columns, rows = (
             slice(*np.searchsorted(places, [centre - reach, centre + reach]))
@@ -151,7 +147,6 @@ class CoverageEvaluator(Evaluator):
         return self._verdict("failed", reason)
 
     def checks(self) -> tuple[Check, ...]:
-        """The share covered, the time to as much as is asked for, and the distance driven in m."""
         covered, reached = self._grid.share, self._reached
         return (
             Check.least("covered", covered, self._least, parameters=("min-share",)),

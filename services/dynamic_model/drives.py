@@ -20,32 +20,20 @@ WHEEL_READING = "opendlv.proxy.AxleAngularVelocityReading"
 
 @dataclass(frozen=True)
 class TwoWheels:
-    """Parameters of a car with two driven wheels beside each other."""
+    """Parameters of a car with two driven wheels beside each other, as ``service.yml`` explains them, in SI units."""
 
     wheel_radius: float
-    """m"""
     track: float
-    """m, between the wheels"""
     top_wheel_speed: float
-    """rad/s, with the whole pedal"""
     motor_lag: float
-    """s, time constant of a wheel's speed"""
     dead_zone: float
-    """Pedal below which a wheel stands"""
     axle_offset: float
-    """m, axle behind the body's origin"""
     wheel_offset: float
-    """Share by which the right wheel turns faster than the left one with the same request"""
     friction: float
-    """Coefficient between wheels and ground"""
     slip: float = 0.0
-    """Share of what the wheels roll that the body does not move"""
     max_speed: float = math.inf
-    """m/s, of a request of motion"""
     max_yaw_rate: float = math.inf
-    """rad/s, of a request of motion"""
     max_acceleration: float = math.inf
-    """m/s2, of a wheel on the ground"""
 
 
 @dataclass
@@ -101,7 +89,6 @@ class DifferentialDrive:
         return BodyMotion(vx, car.axle_offset * turning, turning)
 
     def reset(self) -> None:
-        """Stop the wheels."""
         self.left = self.right = 0.0
 
     def odometry(self, motion: BodyMotion, asked: Mapping[str, float]) -> tuple[Reading, ...]:
@@ -112,26 +99,17 @@ class DifferentialDrive:
 
 @dataclass(frozen=True)
 class SingleTrack:
-    """Parameters of a car that steers with its front wheels."""
+    """Parameters of a car that steers with its front wheels, as ``service.yml`` explains them, in SI units."""
 
     wheel_base: float
-    """m"""
     cg: float
-    """m, centre of mass behind the front axle"""
     friction: float
-    """Coefficient between tyres and ground"""
     max_steering: float
-    """rad, at the front wheel, to either side"""
     steering_rate: float
-    """rad/s, at the front wheel"""
     speed_lag: float
-    """s, time constant of the speed"""
     max_acceleration: float
-    """m/s2"""
     max_braking: float
-    """m/s2"""
     top_speed: float
-    """m/s, forward and in reverse"""
 
     def __post_init__(self) -> None:
         """Raises ValueError for a centre of mass that is not between the axles."""
@@ -147,7 +125,6 @@ class BicycleDrive:
     by_speed: bool = True
     power: float = 1.0
     offset: float = 0.0
-    """rad, at the front wheel"""
 
     def __post_init__(self) -> None:
         self.wheel = self.offset
@@ -181,7 +158,6 @@ class BicycleDrive:
         return self._rolling(vx)
 
     def reset(self) -> None:
-        """Straighten the wheel."""
         self.wheel = self.offset
 
     def odometry(self, motion: BodyMotion, asked: Mapping[str, float]) -> tuple[Reading, ...]:

@@ -52,7 +52,6 @@ def step(motion: BodyMotion, wheel: float, pedal: float, dt: float, car: Car = K
 
 
 def _implicit(motion: BodyMotion, wheel: float, pedal: float, dt: float, car: Car) -> BodyMotion:
-    """One step of implicit Euler."""
     gain = car.gain_forward if pedal > 0 else car.gain_reverse
     vx = (motion.vx + dt * gain * pedal / car.mass) / (1 + dt * car.resistance / car.mass)
     if abs(vx) <= car.slip_speed:
@@ -92,11 +91,9 @@ class Drive(Protocol):
     def step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
         """The motion `dt` seconds later, with the actuators asked for the same all the time."""
 
-    def reset(self) -> None:
-        """Forget all that moves except the body."""
+    def reset(self) -> None: ...
 
-    def odometry(self, motion: BodyMotion, asked: Mapping[str, float]) -> tuple[Reading, ...]:
-        """What its own sensors read."""
+    def odometry(self, motion: BodyMotion, asked: Mapping[str, float]) -> tuple[Reading, ...]: ...
 
 
 def speed_and_steering(speed: float, wheel: float) -> tuple[Reading, Reading]:
@@ -112,7 +109,6 @@ class KiwiDrive:
 
     car: Car = KIWI
     offset: float = 0.0
-    """rad, at the front wheel"""
 
     @property
     def rest(self) -> Mapping[str, float]:
@@ -140,8 +136,7 @@ class KiwiDrive:
     def step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
         return step(motion, asked[STEERING], asked[PEDAL], dt, self.car)
 
-    def reset(self) -> None:
-        """Nothing but the body moves."""
+    def reset(self) -> None: ...
 
     def odometry(self, motion: BodyMotion, asked: Mapping[str, float]) -> tuple[Reading, ...]:
         return speed_and_steering(motion.vx, asked[STEERING])
@@ -159,7 +154,6 @@ class Vehicle:
         """When a request takes effect (us), whether it is one of motion, and what it asks of which actuators."""
         self._asked = dict(self.drive.rest)
         self._follows = False
-        """Whether the last request was one of motion."""
         self._now: int | None = None
 
     def request(self, actuator: str, value: float) -> bool:
@@ -190,7 +184,6 @@ class Vehicle:
 
     @property
     def odometry(self) -> tuple[Reading, ...]:
-        """What the car's own sensors read now."""
         return self.drive.odometry(self.motion, self._asked)
 
     def reset(self) -> None:

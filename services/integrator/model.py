@@ -68,7 +68,6 @@ def displacement(velocity: Vector, rates: Vector, dt: float) -> Vector:
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """The vector product of `a` and `b`."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
@@ -115,7 +114,6 @@ class Twist:
 
 
 def move(pose: BodyPose, twist: Twist, dt: float) -> BodyPose:
-    """The pose after `dt` seconds of a constant twist."""
     step = rotate(pose.attitude, displacement(twist.velocity, twist.rates, dt))
     x, y, z = pose.position
     return BodyPose((x + step[0], y + step[1], z + step[2]), multiply(pose.attitude, turn(twist.rates, dt)))
@@ -140,7 +138,6 @@ class Integrator:
         self._coming.append((sample_time, twist))
 
     def reset(self) -> None:
-        """Stand at the start until the next twist."""
         self.pose, self._twist, self._coming = self._start, Twist(), []
 
     def update(self, now: int) -> BodyPose:

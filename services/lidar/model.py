@@ -30,13 +30,10 @@ class Lidar:
 
     @property
     def increment(self) -> float:
-        """From ray to ray, in rad."""
         return self.field_of_view / (self.rays - (not math.isclose(self.field_of_view, math.tau)))
 
 
 class Scanner:
-    """A lidar on a vehicle in a map."""
-
     def __init__(self, outlines: Outlines, lidar: Lidar, seed: int = 0, stamp: int = 0) -> None:
         self._outlines, self.lidar = outlines, lidar
         self._random = np.random.RandomState([seed, stamp])

@@ -48,7 +48,6 @@ def overlaps(found: Sequence[Box], true: Sequence[Box]) -> Scores:
 
 
 def _corners(boxes: Sequence[Box]) -> Scores:
-    """Left, top, right and bottom of each."""
     table = np.array(boxes, np.float64).reshape(-1, 4)
     with np.errstate(over="ignore", invalid="ignore"):
         table[:, 2:] += table[:, :2]
@@ -210,7 +209,6 @@ class Truth:
     pictures: Mapping[int, tuple[LabelledBox, ...]]
 
     def picture_of(self, key: FrameKey) -> int:
-        """The picture that a frame would have."""
         return {"one": 0, "sample-time": key.time, "number": key.number}[self.frames]
 
     def of(self, key: FrameKey) -> tuple[LabelledBox, ...] | None:
@@ -218,12 +216,10 @@ class Truth:
         return self.pictures.get(self.picture_of(key))
 
     def labels(self) -> list[str]:
-        """All its classes, sorted."""
         return sorted({each.label for boxes in self.pictures.values() for each in boxes})
 
 
 def load_truth(path: Path, frames: Frames) -> Truth:
-    """The truth in a file; raises InputError."""
     found = truth_file.read(path, frames)
     pictures = {key: tuple(LabelledBox(label, Box(*area)) for label, area in boxes) for key, boxes in found.items()}
     return Truth(frames, pictures)

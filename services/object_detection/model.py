@@ -82,7 +82,6 @@ def _fault(check: Check, score: Score) -> str:
 
 
 def _unanswered(check: Check, score: Score) -> str:
-    """How many, and where the longest run is."""
     count, frames, longest = score.unanswered.silent, score.unanswered.frames, score.unanswered.longest
     said = f"{count} of {_count(frames, 'frame')} had no answer, a share of {check.told} ({check.bound})"
     first, last = (frame.place.partition(" ")[2] for frame in (longest[0], longest[-1]))
@@ -160,14 +159,12 @@ class DetectionEvaluator(Evaluator):
         self._frames.clear()
 
     def detect(self, key: FrameKey, number: int, value: Value) -> None:
-        """The application sent something about its detection ``number`` in a frame."""
         if self._is_of_the_future(key):
             self._score.early += isinstance(value, Box)
             return
         self._take(key, number, value, _found)
 
     def reveal(self, key: FrameKey, number: int, value: Value) -> None:
-        """The truth about object ``number`` in a frame."""
         self._has_truth = True
         self._take(key, number, value, _true)
 

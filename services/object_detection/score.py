@@ -49,7 +49,6 @@ class Counts:
     overlap: float = 0.0
 
     def add(self, other: "Counts") -> None:
-        """Add other counts."""
         self.hits += other.hits
         self.false += other.false
         self.missed += other.missed
@@ -57,7 +56,6 @@ class Counts:
 
     @property
     def mistakes(self) -> int:
-        """False and missed ones together."""
         return self.false + self.missed
 
     @property
@@ -77,7 +75,6 @@ class Counts:
 
     @property
     def mean_overlap(self) -> float | None:
-        """The mean intersection over union of the hits."""
         return _ratio(self.overlap, self.hits)
 
 
@@ -93,14 +90,12 @@ class CountsByClass:
     boxes: JudgedBoxes = field(default=JudgedBoxes((), (), ()), compare=False, repr=False)
 
     def add(self, label: str, counts: Counts) -> None:
-        """Add counts of a class."""
         self.by_label.setdefault(label, Counts()).add(counts)
 
     def __iter__(self) -> Iterator[tuple[str, Counts]]:
         return iter(self.by_label.items())
 
     def total(self) -> Counts:
-        """The counts of all classes together."""
         total = Counts()
         for counts in self.by_label.values():
             total.add(counts)
@@ -137,7 +132,6 @@ def compare(
 
 
 def areas(boxes: Sequence[LabelledBox]) -> list[LabelledArea]:
-    """Boxes as they are recorded."""
     return [(label, *box) for label, box in boxes]
 
 
@@ -247,7 +241,6 @@ class DetectionLimits:
     gap: float | None = None
 
     def of(self, measure: str) -> float | None:
-        """The limit of one of MEASURES."""
         limit: float | None = getattr(self, measure)
         return limit
 

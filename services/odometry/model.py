@@ -61,6 +61,5 @@ class Odometer:
         self.twist = Twist(scale * true.vx + speed, scale * true.vy, yaw_rate)
 
     def update(self, now: int) -> None:
-        """Go on to ``now`` (us)."""
         if self.pose is not None and now > self._last:
             self.pose, self._last = self.pose.moved(self.twist, (now - self._last) / 1e6), now

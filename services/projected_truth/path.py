@@ -31,11 +31,9 @@ class MeasuredPath:
 
     @property
     def has_begun(self) -> bool:
-        """Whether any pose is known."""
         return bool(self._poses)
 
     def reaches(self, time: int) -> bool:
-        """Whether a pose of this time or a later one is known."""
         return bool(self._poses) and self._poses[-1][0] >= time
 
     def at(self, time: int) -> CameraPose | None:

@@ -80,14 +80,12 @@ class ProjectedTruth(Service):
                 self._sender.renderer.place(stamp, pose)
 
     def _pose(self, time: int) -> CameraPose | None:
-        """The camera's in the world."""
         if self._path is None:
             return self._mounted
         body = self._path.at(time)
         return body.carrying(self._mounted) if body else None
 
     def tell(self) -> None:
-        """Logs what was done."""
         _log.info("projected the truth into %d pictures", self.projected)
         if self.missed:
             _log.warning("%d pictures have no truth: no pose was measured near them", self.missed)

@@ -112,8 +112,6 @@ class Device:
 
 
 class RangeFinder:
-    """Some sensors of one kind on a vehicle, and what they see of a map."""
-
     def __init__(self, outlines: Outlines, sensors: Sequence[Sensor], device: Device, seed: int = 0) -> None:
         self._outlines, self.sensors, self.device = outlines, tuple(sensors), device
         self._random = [np.random.RandomState([seed, sensor.stamp]) for sensor in sensors]

@@ -188,13 +188,11 @@ class ResponseEvaluator(Evaluator):
         return Verdict("passed", said + self._aside(), checks)
 
     def _from_first(self, asked: Times) -> Times:
-        """The numbers of frames from the first answered one on."""
         answered = np.flatnonzero(self._answered)
         is_soon = len(answered) and self._frames.due[answered[0]] <= self._limits.start_up
         return asked[asked >= answered[0]] if is_soon else asked
 
     def checks(self, answered: int, judged: int) -> Iterator[Check]:
-        """Each measure with its limit, of so many frames answered in time among those judged."""
         limits, broken = self._limits, self._broken
         share, low, high = answered / judged, self._lowest, self._highest
         yield Check.least("share", share, limits.share)

@@ -40,7 +40,6 @@ INVISIBLE = 0.3
 
 Numbers = npt.NDArray[np.intp]
 Drawn = tuple[int, list[Piece]]
-"""The number of a body and its pieces."""
 
 _DRAWINGS: list[Callable[[Group], list[list[Piece]]]] = [silhouettes, whole, cut]
 
@@ -58,7 +57,6 @@ class Bodies:
         """The middle (3,) of each body's bounding sphere, in the world."""
         self._leaf = tree.locate(self.middles)
         self.names = [copies.name for copies in models for _ in copies.turns]
-        """The model's name of each body."""
         stamps = [stamp for copies in models for stamp in copies.stamps]
         first = len(self.names) - len(stamps)
         self._moving = {stamp: body for body, stamp in enumerate(stamps, first)}
@@ -66,7 +64,6 @@ class Bodies:
 
     @property
     def stamps(self) -> tuple[int, ...]:
-        """The sender stamps of what moves."""
         return tuple(self._moving)
 
     def place(self, stamp: int, position: Array, yaw: float) -> None:

@@ -22,7 +22,6 @@ class _Node:
     normal: Array
     offset: float
     number: int
-    """Among all nodes."""
     faces: list[Face]
     children: "list[_Node | int]" = field(default_factory=lambda: [-1, -1])
     """What lies behind the plane and what lies before it: a node, or the number of a leaf."""

@@ -27,7 +27,6 @@ def weld(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
 
 
 def have_area(vertices: Array, triangles: Indices) -> npt.NDArray[np.bool_]:
-    """Which triangles are more than a line."""
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
     doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     longest = np.max([((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)

@@ -80,7 +80,6 @@ class Cut:
 
     @classmethod
     def joined(cls, cuts: Sequence["Cut"]) -> "Cut":
-        """All bodies of some cuts."""
         if len(cuts) == 1:
             return cuts[0]
         lengths = [len(cut.starts) for cut in cuts]
@@ -184,7 +183,6 @@ class Cut:
         return np.asarray(beside & ahead & (along <= self.radii + reach), np.bool_)
 
     def _segments(self, bodies: Numbers) -> Numbers:
-        """The numbers of all segments of these bodies."""
         first, counts = self.first[bodies], self.counts[bodies]
         before = np.cumsum(counts) - counts
         numbers: Numbers = np.repeat(first - before, counts) + np.arange(counts.sum())
@@ -248,12 +246,10 @@ class Mesh:
         return cls(vertices, triangles, is_closed(triangles))
 
     def at(self, height: float) -> Array:
-        """The segments (n, 2, 2) at a height."""
         return slice_mesh(self.vertices, self.triangles, height)
 
     @lru_cache(maxsize=_HEIGHTS)  # noqa: B019 - meshes live as long as their service
     def cut(self, height: float) -> Cut:
-        """It alone at a height."""
         return Cut.of([(self.at(height), self.solid)])
 
 
@@ -274,7 +270,6 @@ class Outlines:
         files = dict.fromkeys(model.file for model in self._map.models)
         self._meshes = {file: Mesh.load(file) for file in files}
         self.moving: dict[int, Mesh] = dict(self._moving(own))
-        """The models at frames, by sender stamp."""
         self._cuts: dict[float, Cut] = {}
 
     def at(self, height: float) -> Cut:

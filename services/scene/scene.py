@@ -211,7 +211,6 @@ def _models(
 
 
 def _shape(entry: ModelEntry, folder: Path) -> tuple[Shape, int]:
-    """The shape in an OBJ file, and how many triangles it is made of."""
     mesh = load_painted(entry.file, folder) if entry.paint is None else load_obj(entry.file)
     return make_shape(*mesh), len(mesh[1])
 
@@ -233,7 +232,6 @@ def _cover(entry: BlockEntry, memory: _Budget, known: Textures) -> Colour | Cove
 
 
 def _default_floor() -> Face:
-    """What a map without blocks stands on: a large patterned square at z = 0."""
     r = _GROUND_REACH
     points = np.array([[-r, -r, 0.0], [r, -r, 0.0], [r, r, 0.0], [-r, r, 0.0]])
     lie = TextureMap(Texture(default_ground()), np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
