@@ -42,7 +42,8 @@ def overlaps(found: Sequence[Box], true: Sequence[Box]) -> Scores:
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         sides = np.minimum(a[..., 2:], b[..., 2:]) - np.maximum(a[..., :2], b[..., :2])
         shared = np.prod(np.maximum(sides, 0.0), axis=-1)
-        union = _areas(a) + _areas(b) - shared
+        areas = [np.prod(each[..., 2:] - each[..., :2], axis=-1) for each in (a, b)]
+        union = areas[0] + areas[1] - shared
         scores: Scores = np.where(_real(a) & _real(b) & (shared > 0.0), shared / union, 0.0)
     return np.nan_to_num(scores, nan=0.0, posinf=0.0)
 
@@ -52,11 +53,6 @@ def _corners(boxes: Sequence[Box]) -> Scores:
     with np.errstate(over="ignore", invalid="ignore"):
         table[:, 2:] += table[:, :2]
     return table
-
-
-def _areas(corners: Scores) -> Scores:
-    areas: Scores = np.prod(corners[..., 2:] - corners[..., :2], axis=-1)
-    return areas
 
 
 def _real(corners: Scores) -> NDArray[np.bool_]:
@@ -81,55 +77,37 @@ def best_pairs(scores: Scores, threshold: float) -> list[Pair]:
     more_than_all = min(part.shape) + 1.0
     gains = np.where(may, part + more_than_all, 0.0)
     turned = len(rows) > len(columns)
-    chosen = _assigned(-gains.T if turned else -gains)
-    pairs = [(int(b), a) if turned else (a, int(b)) for a, b in enumerate(chosen)]
+    chosen = enumerate(_assigned(-gains.T if turned else -gains).tolist())
+    pairs = [(column, row) if turned else (row, column) for column, row in chosen if row >= 0]
     return sorted((int(rows[a]), int(columns[b])) for a, b in pairs if may[a, b])
 
 
 def _assigned(costs: Scores) -> NDArray[np.int64]:
-    """The column of each row so that the sum of costs is smallest; there are no more rows than columns.
+    """The row of each column, -1 for none, so that the sum of costs is smallest; there are no more rows than columns.
 
     Rows join one by one, each along the shortest path of changes that frees a column (Kuhn 1955, in the form of
-    Jonker and Volgenant 1987). Prices of rows and columns keep all reduced costs from being negative.
+    Jonker and Volgenant 1987), with prices of rows and columns. The last column stands for the newcomer.
     """
     rows, columns = costs.shape
-    row_price, column_price = np.zeros(rows), np.zeros(columns)
-    column_of, row_of = np.full(rows, -1), np.full(columns, -1)
+    row_price, column_price = np.zeros(rows), np.zeros(columns + 1)
+    row_of = np.full(columns + 1, -1)
     for newcomer in range(rows):
-        reduced = costs - row_price[:, None] - column_price
-        lengths, came_from, settled, free = _shortest_path(reduced, row_of, newcomer)
-        slack = np.where(settled, lengths[free] - lengths, 0.0)
-        column_price -= slack
-        row_price[newcomer] += lengths[free]
-        moved = np.flatnonzero(settled & (row_of >= 0))
-        row_price[row_of[moved]] += slack[moved]
-        column = free
-        while column >= 0:
-            row = came_from[column]
-            row_of[column] = row
-            column_of[row], column = column, column_of[row]
-    return column_of
-
-
-def _shortest_path(
-    reduced: Scores, row_of: NDArray[np.int64], start: int
-) -> tuple[Scores, NDArray[np.int64], NDArray[np.bool_], int]:
-    """Dijkstra's search from a row to the nearest column without a row.
-
-    Gives each column's distance, the row before it, whether its distance is final, and the column that was found.
-    """
-    count = reduced.shape[1]
-    lengths, came_from, settled = np.full(count, np.inf), np.full(count, -1), np.zeros(count, np.bool_)
-    row, behind = start, 0.0
-    while True:
-        through = behind + reduced[row]
-        shorter = ~settled & (through < lengths)
-        lengths[shorter], came_from[shorter] = through[shorter], row
-        column = int(np.argmin(np.where(settled, np.inf, lengths)))
-        settled[column], behind = True, lengths[column]
-        if row_of[column] < 0:
-            return lengths, came_from, settled, column
-        row = row_of[column]
+        row_of[-1], column = newcomer, columns
+        lengths, came_from = np.full(columns + 1, np.inf), np.full(columns + 1, -1)
+        settled = np.zeros(columns + 1, np.bool_)
+        while row_of[column] >= 0:
+            settled[column], row = True, row_of[column]
+            through = np.append(costs[row] - row_price[row] - column_price[:-1], np.inf)
+            shorter = ~settled & (through < lengths)
+            lengths[shorter], came_from[shorter] = through[shorter], column
+            nearest = int(np.argmin(np.where(settled, np.inf, lengths)))
+            row_price[row_of[settled]] += lengths[nearest]
+            column_price[settled] -= lengths[nearest]
+            lengths[~settled] -= lengths[nearest]
+            column = nearest
+        while column != columns:
+            row_of[column], column = row_of[came_from[column]], came_from[column]
+    return row_of[:-1]
 
 
 class FrameKey(NamedTuple):
