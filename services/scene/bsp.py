@@ -51,6 +51,10 @@ _TRIED = 32
 """Faces of which the one that cuts the fewest is taken."""
 
 
+def _first(_faces: list[Face]) -> int:
+    return 0
+
+
 def _largest(faces: list[Face]) -> int:
     return max(range(len(faces)), key=lambda number: _area(faces[number]))
 
@@ -80,12 +84,12 @@ def _heights(planes: tuple[Array, Array], eye: Array) -> Array:
 class Tree:
     """The partition of some faces; ``leaves`` counts the convex regions that they leave.
 
-    Large faces divide space first; of many faces those that cut the fewest.
+    Large faces divide space first, or those that come first in the list; of many faces those that cut the fewest.
     """
 
-    def __init__(self, faces: list[Face]) -> None:
+    def __init__(self, faces: list[Face], by_area: bool = True) -> None:
         self.leaves = 0
-        self._first = _largest if len(faces) < _MANY else _gentlest
+        self._first = _first if not by_area else _largest if len(faces) < _MANY else _gentlest
         self._nodes: list[_Node] = []
         self._root: _Node | int = -1
         tasks: list[tuple[list[Face], _Node | None, int]] = [(faces, None, 0)]
@@ -126,6 +130,24 @@ class Tree:
             before = points[members] @ node.normal > node.offset
             tasks += [(node.children[0], members[~before]), (node.children[1], members[before])]
         return leaf
+
+    def distribute(self, faces: list[Face]) -> dict[int, list[Face]]:
+        """Other faces by the leaf that they lie in, cut where they cross a plane of the partition."""
+        found: dict[int, list[Face]] = {}
+        tasks = [(self._root, faces)]
+        while tasks:
+            node, parts = tasks.pop()
+            if isinstance(node, int):
+                found[node] = parts
+                continue
+            sides: tuple[list[Face], list[Face]] = ([], [])
+            for face in parts:
+                if (np.abs(face.points @ node.normal - node.offset) <= _THICK).all():
+                    sides[int(float(face.normal @ node.normal) > 0.0)].append(face)
+                else:
+                    _divide(face, node, sides)
+            tasks += [(child, side) for child, side in zip(node.children, sides, strict=True) if side]
+        return found
 
     def back_to_front(self, eye: Array) -> Iterator[Face | int]:
         """Faces that show their front to the eye (3,), and leaves, the farthest first."""

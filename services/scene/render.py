@@ -65,7 +65,7 @@ class Renderer:
         self.scene = scene
         self._tree = Tree(list(scene.faces))
         self._faces = FaceTable(self._tree.faces)
-        self.bodies = Bodies(scene.models, self._tree, scene.light)
+        self.bodies = Bodies(scene.models, self._tree, scene.light, scene.faces)
         self._latest: tuple[bytes, list[Face | Drawn]] = b"", []
         """What was drawn last, from back to front, and the pose that it was drawn from."""
 

@@ -34,12 +34,16 @@ class TextureMap:
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A convex polygon ``points`` (k, 3) in world m, seen from where ``normal . p > offset`` only."""
+    """A convex polygon ``points`` (k, 3) in world m, seen from where ``normal . p > offset`` only.
+
+    ``owner`` is the number of the model's copy that it belongs to, if any.
+    """
 
     points: Array
     normal: Array
     offset: float
     paint: Colour | TextureMap
+    owner: int = -1
 
     def part(self, points: Array) -> "Face":
         return replace(self, points=points)
