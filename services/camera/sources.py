@@ -22,10 +22,10 @@ import cv2
 import numpy as np
 
 from dodo_dsl.opendlv.address import IMAGE
-from dodo_dsl.opendlv.picture_size import problem_of, too_large
+from dodo_dsl.opendlv.picture_size import too_large
 from services.camera.picture import CameraError, Image, SharedPicture, from_bgr, from_i420
+from services.scene.textures import load_picture
 
-MAX_BYTES = 64 << 20
 RECORDING = ".rec"
 _SIDES = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
 
@@ -64,16 +64,10 @@ def repeated(path: Path) -> Iterator[Image]:
 
 
 def still(path: Path) -> Image | None:
-    """The picture of an image file, None for other files; raises ValueError for one that is too large to be decoded."""
+    """The picture of an image file, None for other files; raises InputError."""
     if not cv2.haveImageReader(str(path)):
         return None
-    if path.stat().st_size > MAX_BYTES:
-        raise ValueError(f"{path}: an image of {path.stat().st_size} bytes, expected at most {MAX_BYTES}")
-    data = path.read_bytes()
-    if problem := problem_of(data):
-        raise ValueError(f"{path}: {problem}")
-    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    return None if picture is None else np.asarray(picture, np.uint8)
+    return load_picture(path)
 
 
 def filmed(path: Path) -> Iterator[Image]:

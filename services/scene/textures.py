@@ -55,23 +55,17 @@ def _repeated(tile: Image, limit: int) -> Image:
     return np.tile(tile, (down, across, 1))
 
 
-def picture_bytes(path: Path) -> Image:
-    """The bytes of a PNG or JPEG file that is small enough to be decoded; InputError otherwise."""
+def load_picture(path: Path, flags: int = cv2.IMREAD_COLOR) -> Image:
+    """A PNG or JPEG file as OpenCV's ``flags`` have it, B, G, R by default; raises InputError."""
     data = read_bytes(path)
     if problem := problem_of(data):
-        raise InputError(path, f"{problem}")
-    return np.frombuffer(data, np.uint8)
-
-
-def load_picture(path: Path) -> Image:
-    """A picture file as (rows, columns, 3), B, G, R; InputError when OpenCV cannot read it."""
-    data = picture_bytes(path)
+        raise InputError(path, problem)
     try:
-        picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except cv2.error as error:
         raise InputError(path, f"the picture cannot be read: {error.err}") from error
-    if picture is None:
-        raise InputError(path, "not a readable picture, expected PNG or JPEG")
+    if picture is None or picture.dtype != np.uint8:
+        raise InputError(path, "not a picture with 8 bits per colour, expected PNG or JPEG")
     return np.asarray(picture, np.uint8)
 
 

@@ -7,7 +7,6 @@ and gain, and n the noise.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -15,23 +14,16 @@ import numpy as np
 import numpy.typing as npt
 
 from dodo_dsl.opendlv.assets.map_file import OverlayEntry
-from dodo_dsl.opendlv.assets.problem import InputError
 from services.scene.camera import CameraMotion, CameraPose, Pinhole
 from services.scene.lens import Alignment, Distortion, lens_of
 from services.scene.raster import Image
 from services.scene.render import Renderer
-from services.scene.textures import picture_bytes
+from services.scene.textures import load_picture
 
 
 def load_with_alpha(path: Path) -> Image:
     """A picture file as (rows, columns, 4), B, G, R, A, opaque if it has no alpha; InputError otherwise."""
-    data = picture_bytes(path)
-    try:
-        picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
-    except cv2.error:
-        picture = None
-    if picture is None or picture.dtype != np.uint8:
-        raise InputError(path, "not a picture with 8 bits per colour, expected PNG or JPEG")
+    picture = load_picture(path, cv2.IMREAD_UNCHANGED)
     channels = 1 if picture.ndim == 2 else picture.shape[2]
     codes = {1: cv2.COLOR_GRAY2BGRA, 3: cv2.COLOR_BGR2BGRA}
     return np.asarray(cv2.cvtColor(picture, codes[channels]) if channels in codes else picture, np.uint8)
@@ -73,33 +65,17 @@ GAMMA = 2.2
 _POOL = 1 << 19
 
 
-@dataclass(frozen=True)
 class Sensor:
     """``exposure`` and ``gain`` are factors of light, 1 as drawn; ``noise`` is a standard deviation, 1 the full scale.
 
     The noise is Gaussian, independent in each colour of each pixel; ``seed`` and the picture's time decide it.
     """
 
-    exposure: float = 1.0
-    gain: float = 1.0
-    noise: float = 0.0
-    seed: int = 0
-
-    def table(self, factor: float) -> Image:
-        """Values (1, 256, 4) for each value of a colour after so much more light; alpha stays."""
-        values = np.arange(256.0)
-        brighter = np.minimum(np.rint(values * factor ** (1 / GAMMA)), 255.0)
-        return np.stack([brighter, brighter, brighter, values], axis=-1).astype(np.uint8)[None]
-
-
-class Development:
-    """Applies a sensor to pictures, in place."""
-
-    def __init__(self, sensor: Sensor) -> None:
-        self._sensor = sensor
-        self._exposure = sensor.table(sensor.exposure) if sensor.exposure != 1.0 else None
-        self._gain = sensor.table(sensor.gain) if sensor.gain != 1.0 else None
-        self._pools = _pools(sensor) if sensor.noise > 0.0 else None
+    def __init__(self, exposure: float = 1.0, gain: float = 1.0, noise: float = 0.0, seed: int = 0) -> None:
+        self._exposure = _table(exposure) if exposure != 1.0 else None
+        self._gain = _table(gain) if gain != 1.0 else None
+        self._pools = _pools(noise, seed) if noise > 0.0 else None
+        self._seed = seed
 
     def develop(self, picture: Image, sample_time: int) -> None:
         """Changes a picture (height, width, 4) that was sampled at ``sample_time`` us."""
@@ -115,15 +91,22 @@ class Development:
     def _rows(self, shape: tuple[int, ...], sample_time: int) -> npt.NDArray[np.intp]:
         """For each row of a picture the pixel of the pool where its noise begins, drawn by lot."""
         height, width = shape[:2]
-        random = np.random.RandomState([self._sensor.seed, sample_time & 0xFFFFFFFF, sample_time >> 32 & 0xFFFFFFFF])
+        random = np.random.RandomState([self._seed, sample_time & 0xFFFFFFFF, sample_time >> 32 & 0xFFFFFFFF])
         return random.randint(0, _POOL - width + 1, height)
 
 
-def _pools(sensor: Sensor) -> tuple[Image, Image]:
+def _table(factor: float) -> Image:
+    """Values (1, 256, 4) for each value of a colour after so much more light; alpha stays."""
+    values = np.arange(256.0)
+    brighter = np.minimum(np.rint(values * factor ** (1 / GAMMA)), 255.0)
+    return np.stack([brighter, brighter, brighter, values], axis=-1).astype(np.uint8)[None]
+
+
+def _pools(noise: float, seed: int) -> tuple[Image, Image]:
     """Noise for so many pixels (n, 4), none in alpha: what it adds, and what it takes away."""
-    random = np.random.RandomState([2903, sensor.seed])
+    random = np.random.RandomState([2903, seed])
     pool = np.zeros((_POOL, 4), np.int16)
-    pool[:, :3] = np.rint(random.standard_normal((_POOL, 3)) * (sensor.noise * 255.0))
+    pool[:, :3] = np.rint(random.standard_normal((_POOL, 3)) * (noise * 255.0))
     return np.clip(pool, 0, 255).astype(np.uint8), np.clip(-pool, 0, 255).astype(np.uint8)
 
 
@@ -151,7 +134,7 @@ class Optics:
         self.wide = self.lens.wide if self.lens else camera
         """What a renderer has to draw."""
         self._overlays, self._shutter = overlays, shutter
-        self._development = Development(sensor or Sensor())
+        self._sensor = sensor or Sensor()
         shape = (self.wide.height, self.wide.width, 4)
         self._ideal = np.empty(shape, np.uint8)
         self._sums = np.empty((2, *shape), np.uint16) if shutter > 0.0 else None
@@ -173,7 +156,7 @@ class Optics:
             self.lens.apply(ideal, out)
         for overlay in self._overlays:
             overlay.lay(out)
-        self._development.develop(out, sample_time)
+        self._sensor.develop(out, sample_time)
 
     def _blend(
         self,

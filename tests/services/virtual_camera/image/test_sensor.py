@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from services.virtual_camera.optics import GAMMA, Development, Sensor
+from services.virtual_camera.optics import GAMMA, Sensor
 
 
 def developed(sensor, value=100, sample_time=5, size=(120, 200)):
     picture = np.full((*size, 4), value, np.uint8)
     picture[..., 3] = 255
-    Development(sensor).develop(picture, sample_time)
+    sensor.develop(picture, sample_time)
     assert (picture[..., 3] == 255).all()
     return picture[..., :3].astype(float)
 
@@ -28,7 +28,7 @@ def test_noise_has_its_deviation_and_no_bias(noise):
 
 
 def test_seed_and_time_decide_the_noise_and_what_came_before_does_not():
-    sensor = Development(Sensor(noise=0.1, seed=7))
+    sensor = Sensor(noise=0.1, seed=7)
     pictures = []
     for time in (1, 2, 1, 1 + (1 << 32)):
         picture = np.full((40, 60, 4), 128, np.uint8)
