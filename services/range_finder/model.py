@@ -15,10 +15,6 @@ from services.scene.outlines import Array, Cut, Outlines, Place
 Beyond = Literal["maximum", "zero", "silence"]
 
 
-class CurveError(ValueError):
-    """A curve that no sensor can have; one sentence."""
-
-
 @dataclass(frozen=True)
 class Curve:
     """The voltages (V) of an infrared sensor at distances (m), the nearest first, straight between them.
@@ -32,16 +28,16 @@ class Curve:
 
     @classmethod
     def parse(cls, text: str) -> "Curve":
-        """From ``V,m;V,m``, as OpenDLV's logic-distance-voltage has it; raises CurveError."""
+        """From ``V,m;V,m``, as OpenDLV's logic-distance-voltage has it; raises ValueError."""
         try:
             points = [tuple(float(number) for number in point.split(",")) for point in text.split(";") if point.strip()]
             volts, metres = zip(*((v, m) for v, m in points), strict=True)
         except ValueError:
-            raise CurveError(f"--curve={text} is not a list of points V,m;V,m") from None
+            raise ValueError(f"--curve={text} is not a list of points V,m;V,m") from None
         if len(points) < 2 or not all(map(math.isfinite, (*volts, *metres))) or min(*volts, *metres) <= 0.0:
-            raise CurveError(f"--curve={text} needs two points V,m or more, of numbers above 0")
+            raise ValueError(f"--curve={text} needs two points V,m or more, of numbers above 0")
         if list(volts) != sorted(set(volts), reverse=True) or list(metres) != sorted(set(metres)):
-            raise CurveError(f"--curve={text} has to fall from the nearest distance to the farthest")
+            raise ValueError(f"--curve={text} has to fall from the nearest distance to the farthest")
         return cls(metres, volts)
 
     def voltage(self, distance: float, near: float) -> float:

@@ -49,31 +49,26 @@ def at_rate(freq: float, seconds: float) -> Frames:
     return Frames(np.rint(np.arange(int(freq * seconds) + 1) * (MICROSECONDS / freq)).astype(np.int64))
 
 
-@dataclass(frozen=True)
-class PlayedPart:
-    """What is played of a recording, times in s: the pictures of ``sender``, from ``start`` to ``end``.
+def of_recording(
+    path: Path,
+    sender: int,
+    start: float,
+    end: float | None,
+    max_gap: float,
+    timemod: float,
+    is_test_time: bool = False,
+) -> Frames:
+    """The pictures of ``sender`` as the player shows them, from ``start`` to ``end`` s; raises ValueError if none is.
 
-    Gaps are at most ``max_gap``, and then all goes ``timemod`` times faster. ``is_test_time``: pictures carry the
+    Gaps are at most ``max_gap`` s, and then all goes ``timemod`` times faster. ``is_test_time``: pictures carry the
     time of the test.
     """
-
-    sender: int
-    start: float = 0.0
-    end: float | None = None
-    max_gap: float = 1.0
-    timemod: float = 1.0
-    is_test_time: bool = False
-
-
-def of_recording(path: Path, part: PlayedPart) -> Frames:
-    """The frames as the player shows them; raises ValueError if there are none."""
     with Recording(path) as recording:
-        max_gap = round(part.max_gap * MICROSECONDS)
-        rows, times, due = recording_times.played(recording, part.start, part.end, max_gap, part.timemod)
-        shown = np.isin(rows, recording.rows([IMAGE], sender_stamps=[part.sender]))
+        rows, times, due = recording_times.played(recording, start, end, round(max_gap * MICROSECONDS), timemod)
+        shown = np.isin(rows, recording.rows([IMAGE], sender_stamps=[sender]))
     if not shown.any():
-        raise ValueError(f"{path}: has no pictures of sender {part.sender} in the part that is played")
-    return Frames(due[shown], None if part.is_test_time else times[shown])
+        raise ValueError(f"{path}: has no pictures of sender {sender} in the part that is played")
+    return Frames(due[shown], None if is_test_time else times[shown])
 
 
 @dataclass(frozen=True)
@@ -92,14 +87,6 @@ class ResponseLimits:
     exact: float = 0.0
 
 
-@dataclass(frozen=True)
-class BrokenValue:
-    """The first value that is not finite: the field, and the time in s."""
-
-    field: str
-    time: float
-
-
 class ResponseEvaluator(Evaluator):
     """Consumes answers; ``name`` is theirs in sentences, ``field`` the one with bounds, empty for none."""
 
@@ -116,7 +103,8 @@ class ResponseEvaluator(Evaluator):
     def _clear(self) -> None:
         self._answered = np.zeros(len(self._frames.due), np.bool_)
         self._received = self._late = self._broken = 0
-        self._first_broken: BrokenValue | None = None
+        self._first_broken: tuple[str, float] | None = None
+        """The field, and the time in s."""
         self._lowest = self._highest = self._delay = None
 
     _lowest: float | None
@@ -154,7 +142,7 @@ class ResponseEvaluator(Evaluator):
             value = sent
             if not np.isfinite(value):
                 self._broken += 1
-                self._first_broken = self._first_broken or BrokenValue(field, self.elapsed(time))
+                self._first_broken = self._first_broken or (field, self.elapsed(time))
             elif field == self._field:
                 limits, exact = self._limits, self._limits.exact * abs(value)
                 value = at_limit(at_limit(value, limits.low, exact), limits.high, exact)
@@ -175,7 +163,7 @@ class ResponseEvaluator(Evaluator):
         judged = self._from_first(asked)
         answered = int(self._answered[judged].sum())
         checks = tuple(self.checks(answered, len(judged)))
-        evidence = {"time": self._first_broken.time} if self._first_broken else {}
+        evidence = {"time": self._first_broken[1]} if self._first_broken else {}
         if not self._received:
             return Verdict("failed", f"no {self._name} came {span.within}", checks, silent=True)
         faults = [self._fault(check, judged) for check in checks if not check.ok]
@@ -213,11 +201,11 @@ class ResponseEvaluator(Evaluator):
         if check.name == "frames":
             return f"only {check.value} frames were answered ({check.bound})"
         if check.name == "broken" and self._first_broken:
-            first = self._first_broken
+            field, time = self._first_broken
             what = (
                 "1 value is not a finite number" if check.value == 1 else f"{check.value} values are not finite numbers"
             )
-            return f"{what}, the first is {first.field} at {first.time:.2f} s"
+            return f"{what}, the first is {field} at {time:.2f} s"
         return f"the {check.name} {self._field} is {check.told} ({check.bound})"
 
     def _longest(self, judged: Times) -> str:

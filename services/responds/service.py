@@ -7,7 +7,7 @@ from typing import Any
 from services.base import Context, Flags
 from services.base.clock import MICROSECONDS
 from services.base.service import SINGLE
-from services.responds.model import Frames, PlayedPart, ResponseEvaluator, ResponseLimits, at_rate, of_recording
+from services.responds.model import Frames, ResponseEvaluator, ResponseLimits, at_rate, of_recording
 
 
 class Responds(ResponseEvaluator):
@@ -35,15 +35,15 @@ build = Responds
 def _frames(flags: Flags) -> Frames:
     if not flags["rec"]:
         return at_rate(flags["freq"], flags["max-time"])
-    part = PlayedPart(
-        sender=flags["video-sender"] or 0,
-        start=flags["start"] or 0.0,
-        end=flags["end"],
-        max_gap=flags["max-gap"],
-        timemod=flags["timemod"] or 1.0,
-        is_test_time=flags["sample-times"] == "test",
+    return of_recording(
+        Path(flags["rec"]),
+        flags["video-sender"] or 0,
+        flags["start"] or 0.0,
+        flags["end"],
+        flags["max-gap"],
+        flags["timemod"] or 1.0,
+        flags["sample-times"] == "test",
     )
-    return of_recording(Path(flags["rec"]), part)
 
 
 def _limits(flags: Flags) -> ResponseLimits:

@@ -109,15 +109,11 @@ _SHARPER = 0.3
 """Levels change this much (in octaves of resolution) later than where sizes match best."""
 
 
-def corner_rays(camera: Pinhole) -> Array:
-    """Directions (4, 3), in the camera frame with z = 1, of the picture's corners."""
-    x, y = camera.width / 2 / camera.focal, camera.height / 2 / camera.focal
-    return np.array([[-x, -y, 1.0], [x, -y, 1.0], [x, y, 1.0], [-x, y, 1.0]])
-
-
 def draw_backdrop(image: Image, view: View, sky: Colour, ground: Colour) -> None:
     """Sky down to a little below the horizon, then ground wherever the line of sight falls."""
-    rays, camera = corner_rays(view.camera), view.camera
+    camera = view.camera
+    x, y = camera.width / 2 / camera.focal, camera.height / 2 / camera.focal
+    rays = np.array([[-x, -y, 1.0], [x, -y, 1.0], [x, y, 1.0], [-x, y, 1.0]])
     above = clip(rays, view.axes[:, 2], _UNDER * float(np.linalg.norm(view.axes[:2, 2])) / camera.focal)
     if len(above):
         fill_fixed(image, fixed(camera.project(above)), sky)

@@ -9,7 +9,7 @@ import pytest
 
 FAKE = '''#!{python}
 """A camera of a Raspberry Pi: pictures whose brightness counts up; MODE makes it misbehave."""
-import os, signal, sys, time
+import os, sys, time
 flags = dict(zip(sys.argv[1::1], sys.argv[2::1]))
 open(os.environ["FAKE_ARGV"], "w").write("\\n".join(sys.argv[1:]))
 mode = os.environ.get("FAKE_MODE", "")
@@ -18,20 +18,14 @@ sys.stderr.write("[0:00:01] INFO Camera starts\\n")
 if mode == "missing":
     sys.stderr.write("ERROR: *** no cameras available ***\\n")
     sys.exit(255)
-if mode == "stubborn":
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-count, begin = 0, time.monotonic()
+count = 0
 while mode != "silent":
     count += 1
     picture = bytes([16 + count]) * (width * height) + bytes([128]) * (width * height // 2)
-    if mode in ("lit", "frozen", "dark"):
-        bright = 40 if mode == "dark" or (mode == "lit" and time.monotonic() - begin < 0.5) else 210
-        stripes = bytes([16, bright if bright > 40 else 17]) * (width * height // 2)
-        picture = bytes([16 + (mode != "frozen") * count % 2]) + stripes[1:] + bytes([128]) * (width * height // 2)
     for part in (picture[:1000], picture[1000:]):
         sys.stdout.buffer.write(part)
         sys.stdout.buffer.flush()
-    if mode in ("lost", "stopped", "stubborn") and count == 3:
+    if mode in ("lost", "stopped") and count == 3:
         if mode == "lost":
             sys.stderr.write("ERROR: *** Device timeout detected ***\\n")
             sys.exit(1)

@@ -34,24 +34,3 @@ def test_a_picture_is_checked(
     result = check(str(path), ok=not words)
     assert words in result.get("reason", "") + result.get("error", "")
     assert ("error" in result) == (picture is None)
-
-
-@pytest.mark.usefixtures("rpicam")
-@pytest.mark.parametrize(
-    ("mode", "words"),
-    [
-        pytest.param("lit", "", marks=pytest.mark.realtime),
-        ("dark", "is it lit?"),
-        pytest.param("frozen", "has shown the same picture for 2 s", marks=pytest.mark.realtime),
-        ("lost", "rpicam-vid ended with code 1"),
-    ],
-)
-@pytest.mark.thorough
-def test_a_live_camera_is_checked_when_it_has_settled(monkeypatch: pytest.MonkeyPatch, mode: str, words: str) -> None:
-    """It is dark at first, as it finds its exposure."""
-    if mode in ("dark", "frozen"):
-        monkeypatch.setattr(health_check, "SETTLED", 0.1)
-    if mode == "frozen":
-        monkeypatch.setattr(health_check, "FIRST", 2.0)
-    monkeypatch.setenv("FAKE_MODE", mode)
-    assert words in check("rpicam", ok=not words).get("reason", "")

@@ -138,23 +138,6 @@ def test_an_application_that_falls_silent_fails() -> None:
     assert (values(decided(it))["gap"], values(decided(it))["mean"]) == (8.02, pytest.approx(0))
 
 
-@pytest.mark.parametrize(
-    ("times", "gap"),
-    [
-        (np.arange(2.5, 10, 0.1), "between 0.00 s and 2.50 s"),
-        (np.array([*np.arange(0, 2.1, 0.1), *np.arange(7.2, 10, 0.1)]), "between 2.00 s and 7.20 s"),
-        (np.arange(0, 8, 0.1), "between 7.90 s and 10.00 s"),
-    ],
-)
-def test_a_gap_is_named_wherever_it_is(times: list[float], gap: str) -> None:
-    it = judge(SignalLimits(mean=1.0, gap=2 * SECOND))
-    hear(it, *((time, time / 10) for time in times))
-    assert decided(it).reason.startswith(f"nothing came {gap} (at most 2 s)")
-    wide = judge(SignalLimits(mean=1.0, gap=6 * SECOND))
-    hear(wide, *((time, time / 10) for time in times))
-    assert decided(wide).outcome == "passed"
-
-
 @pytest.mark.parametrize(("first", "outcome"), [(2.0, "passed"), (2.1, "failed")])
 def test_the_application_may_start_slowly(first: float, outcome: str) -> None:
     it = judge(SignalLimits(mean=1.0, coverage=1.0, gap=SECOND, start_up=2 * SECOND))
@@ -281,13 +264,6 @@ def test_what_is_recorded_is_marked_as_it_was_judged() -> None:
     times, values, marks = found["samples"]
     assert (times, marks) == ([0.5, 2, 3, 4, 5, 11], [0, 0, 1, 2, 2, 0])
     assert values[:3] == [3.0, 0.2, 0.45]
-
-
-def test_of_very_many_samples_the_farthest_are_recorded() -> None:
-    away = np.zeros(model.MOST_SAMPLES * 2 + 2)
-    away[[7, 40_000]] = 1.0
-    chosen = model.farthest_of(np.arange(len(away)), away)
-    assert len(chosen) <= model.MOST_SAMPLES and {7, 40_000} <= {*chosen} and chosen == sorted(chosen)
 
 
 def shares(verdict: Verdict) -> dict[str, float | None]:

@@ -112,26 +112,3 @@ def test_a_bicycle_by_speed_and_one_by_acceleration() -> None:
         for now in range(0, 6_000_001, 10_000):
             (output,) = model.update(now)
         assert output.message.vx == pytest.approx(speed, rel=1e-3)
-
-
-def test_the_condition_of_other_drives() -> None:
-    def speed(
-        seconds: int, drive: str, requests: dict[tuple[str, int | None], dict[str, float]], **flags: object
-    ) -> float:
-        model, messages = service(drive=drive, **flags), MessageSet.standard()
-        model.update(0)
-        for (name, stamp), fields in requests.items():
-            model.inputs[name, stamp](messages.type(name)(**fields), 0)
-        for now in range(10_000, seconds * SECOND + 1, 10_000):
-            outputs = model.update(now)
-        return float(outputs[0].message.vx)
-
-    both = {(PEDALS, 0): {"position": 1.0}, (PEDALS, 1): {"position": 1.0}}
-    kiwi: dict[tuple[str, int | None], dict[str, float]] = {(PEDAL, None): {"position": 0.14}}
-    assert speed(10, "kiwi", kiwi, power=0.5) == pytest.approx(0.455, abs=1e-6)
-    assert speed(3, "differential", both) == pytest.approx(0.91, rel=1e-6)
-    assert speed(3, "differential", both, power=0.5) == pytest.approx(0.455, rel=1e-6)
-    assert speed(1, "differential", both, grip=0.05, friction=1) == pytest.approx(0.05 * 9.81, rel=1e-3)
-    fast: dict[tuple[str, int | None], dict[str, float]] = {(SPEED, None): {"groundSpeed": 30.0}}
-    gained = [speed(2, "bicycle", fast, **flags) for flags in ({}, {"power": 0.5}, {"grip": 0.1}, {"latency": 1})]
-    assert gained == pytest.approx([7.0, 3.5, 0.1 * 9.81 * 2, 3.5], rel=1e-6)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.range_finder.model import Curve, CurveError, Device, RangeFinder, Sensor
+from services.range_finder.model import Curve, Device, RangeFinder, Sensor
 from services.scene.outlines import Cut, Outlines, Place
 
 KIWI = "3.0,0.04;1.6,0.078;1.0,0.13;0.6,0.22;0.3,0.4"
@@ -84,5 +84,5 @@ def test_the_voltage_of_an_infrared_sensor():
     "text", ["", "3.0", "3,0.1", "1,0.1;2,0.2", "2,0.2;1,0.1", "2,0;1,1", "nan,1;1,2", "2,1;2,3", "a,b"]
 )
 def test_a_curve_falls(text):
-    with pytest.raises(CurveError):
+    with pytest.raises(ValueError):
         Curve.parse(text)

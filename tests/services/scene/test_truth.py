@@ -51,23 +51,6 @@ def test_a_box_holds_the_projection_of_all_corners(straight, x, y, z, pitch, yaw
         assert edges(box) == pytest.approx([f(part) for part in cut for f in (np.min, np.max)], abs=1e-6)
 
 
-@pytest.mark.slow
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.floats(-0.2, 0.2), st.floats(-0.3, 3), st.floats(0.05, 0.3), st.floats(1.0, 2.2))
-def test_a_model_that_is_seen_has_a_box_around_its_pixels(straight, x, y, z, yaw):
-    pose = CameraPose.at(x, y, z, pitch=0.1, yaw=yaw)
-    labels, _ = straight.labels(pose)
-    found = {box.number: box for box in SceneTruth(straight, classes_of([], straight.bodies.names), ALL).boxes(pose)}
-    assert set(found) == set(np.unique(labels).tolist()) - {-1}
-    for number, box in found.items():
-        rows, columns = np.nonzero(labels == number)
-        left, right, top, bottom = edges(box)
-        seen = columns.min(), columns.max() + 1, rows.min(), rows.max() + 1
-        outside = np.array([left - seen[0], seen[1] - right, top - seen[2], seen[3] - bottom])
-        assert outside.max() < 1.5
-        assert 0 < box.visible <= 1
-
-
 def test_what_hides_a_model_takes_from_its_visible_share(cube_at):
     """Two cubes one behind the other; the nearer is smaller in height but as wide as the other's left half."""
     apart = boxes(cube_at([4, 0, 0, 0], [9, 3, 0, 0]), CameraPose.at(0, 0, 0.5))

@@ -8,7 +8,7 @@ from services.base import UnusableMessageError
 from services.scene.camera import CameraPose, mount
 from services.scene.render import Renderer
 from services.scene.scene import load_scene
-from services.virtual_camera.model import VirtualCamera, to_i420
+from services.virtual_camera.model import VirtualCamera
 
 
 def frame(x=0.0, y=0.0, z=0.0, yaw=0.0, **changes):
@@ -47,16 +47,6 @@ def test_a_picture_shows_the_latest_frame_and_bears_the_time_of_the_update(rende
     )  # fmt: skip
     assert [time for _, _, time in pictures] == [1_000_000, 1_100_000]
     assert all(np.array_equal(argb, expected) for argb, _, _ in pictures)
-
-
-def test_i420_follows_bt601():
-    colours = np.array([[255, 255, 255], [0, 0, 0], [0, 0, 255], [0, 255, 0], [255, 0, 0]], np.uint8)
-    for blue, green, red in colours.astype(float):
-        planes = to_i420(np.full((2, 2, 4), (blue, green, red, 255), np.uint8)).ravel()
-        luma = 16 + (65.481 * red + 128.553 * green + 24.966 * blue) / 255
-        u = 128 + (-37.797 * red - 74.203 * green + 112.0 * blue) / 255
-        v = 128 + (112.0 * red - 93.786 * green - 18.214 * blue) / 255
-        assert planes == pytest.approx([luma] * 4 + [u, v], abs=1)
 
 
 @pytest.mark.parametrize("bad", [{"qw": 0.0}, {"x": math.nan}, {"y": math.inf}, {"z": 2e6}, {"qx": math.nan}])

@@ -3,12 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from services.scene.bodies import MAX_FACES, Bodies, groups
-from services.scene.bsp import Tree
+from services.scene.bodies import MAX_FACES
 from services.scene.camera import CameraPose
 from services.scene.render import Renderer
 from services.scene.scene import load_scene
-from services.scene.shading import Light
 
 
 def crossing(folder_of, *places, block=()):
@@ -72,17 +70,6 @@ def test_a_cube_through_a_wall_shows_on_both_sides(write_map):
     renderer = Renderer(crossing(write_map, (3, 0, 0, 0.4), block=[wall]), 160, 120, 0.9)
     for x, yaw in ((0, 0), (6, math.pi)):
         assert (renderer.labels(CameraPose.at(x, 0, 0.5, yaw=yaw))[0] == 0).sum() > 300
-
-
-def test_models_that_only_stand_side_by_side_are_not_cut_up(write_map):
-    floor = {"name": "f", "dimension": [90, 90, 1], "color": [1, 1, 1], "instances": [[0, 0, -0.5, 0]]}
-    scene = crossing(write_map, (3, 0, 0, 0), (3, 1, 0, 0), (4.3, 0, 0, 0.7), block=[floor])
-    bodies = Bodies(scene.models, Tree(list(scene.faces)), Light.usual(), scene.faces)
-    assert bodies.solids == 0
-
-
-def test_groups_are_linked_bodies():
-    assert groups({9}, [(1, 2), (4, 3), (2, 3), (6, 7)]) == [[1, 2, 3, 4], [6, 7], [9]]
 
 
 @pytest.mark.thorough
