@@ -14,6 +14,7 @@ from services.object_detection.boxes import Box, DetectedFrame, Detections, Fram
 from services.object_detection.score import (
     KINDS,
     MEASURES,
+    SMALL,
     CountsByClass,
     DetectionLimits,
     JudgedFrame,
@@ -98,7 +99,10 @@ def _nothing(measure: str) -> str:
 
 def _kinds(score: Score) -> str:
     kinds = ", ".join(f"{count} {KINDS[kind]}" for kind, count in score.counts.kinds.most_common())
-    return f"; false detections: {kinds}" if kinds else ""
+    missed, found = (sum(each) / max(1, len(each)) for each in (score.counts.missed, score.counts.found))
+    sizes = f"{missed:.2g} of the picture's height on average, and found ones {found:.2g}"
+    small = f"; missed objects are small: {sizes}" if 0.0 < missed < SMALL * found else ""
+    return (f"; false detections: {kinds}" if kinds else "") + small
 
 
 def _worst(score: Score) -> str:

@@ -14,6 +14,8 @@ from services.base import Check, JudgedBoxes
 from services.base.judged import LabelledArea, ScoredArea
 from services.object_detection.boxes import LabelledBox, best_pairs, overlaps
 
+SMALL = 0.6
+"""Mean height of the missed objects to that of the found ones, below which size is the matter."""
 OUTSIDE = 2.0
 """Fraction of the picture from which on a box is far outside of it."""
 KINDS = {
@@ -82,11 +84,14 @@ class Counts:
 class CountsByClass:
     """Counts by class, in the order in which classes came, and of false detections by KINDS.
 
+    ``missed`` and ``found`` are heights of objects, in fractions of the picture's.
     Those of one frame have its ``boxes``.
     """
 
     by_label: dict[str, Counts] = field(default_factory=dict)
     kinds: Counter[str] = field(default_factory=Counter, compare=False)
+    missed: list[float] = field(default_factory=list, compare=False)
+    found: list[float] = field(default_factory=list, compare=False)
     boxes: JudgedBoxes = field(default=JudgedBoxes((), (), ()), compare=False, repr=False)
 
     def add(self, label: str, counts: Counts) -> None:
@@ -127,6 +132,7 @@ def compare(
         for column, each in enumerate(real):
             (hit if column in columns else missed).append(each)
     result.kinds.update(_kind(each, hit, missed, threshold) for each in false)
+    result.missed, result.found = ([each.box.height for each in boxes] for boxes in (missed, hit))
     result.boxes = JudgedBoxes(right, areas(false), areas(missed))
     return result
 
@@ -206,7 +212,7 @@ class Silence:
 
 MEASURES = ("precision", "recall", "f1")
 MOST_CLASSES = 20
-"""With checks of their own, of those that only the application names: the runner reads lines of 64 KiB."""
+"""So many classes that only the application names have checks: the runner reads lines of 64 KiB."""
 
 
 @dataclass(frozen=True)
@@ -282,6 +288,8 @@ class Score:
         for label, counts in frame:
             self.counts.add(label, counts)
         self.counts.kinds += frame.kinds
+        self.counts.missed += frame.missed
+        self.counts.found += frame.found
         counts = frame.total()
         if counts.mistakes > (self.worst.counts.mistakes if self.worst else 0):
             self.worst = WorstFrame(place, counts, key)

@@ -81,3 +81,10 @@ def test_labels_of_an_application_cannot_make_a_verdict_that_is_not_read() -> No
 def test_kinds_of_false_detections(found: LabelledBox, kind: str) -> None:
     true = LabelledBox("a", Box(0.1, 0.5, 0.04, 0.05))
     assert compare([true, found], [true], 0.5, ()).kinds == {kind: 1}
+
+
+def test_small_objects_are_missed() -> None:
+    found = Score(CountsByClass({"a": Counts(1, 0, 1)}, missed=[0.05], found=[0.1]), frames=2, answered=2)
+    assert "; missed objects are small: 0.05 of the picture's height on average, and found ones 0.1" in (
+        verdict(found, DetectionLimits(recall=0.9), "").reason
+    )
