@@ -215,11 +215,15 @@ class SignalEvaluator(Evaluator):
             frames = frames[[not hidden.hides(frame) for frame in frames.tolist()]]
         if hidden and hidden.shown(judged[0]) == hidden.shown(judged[1]):
             raise UnjudgeableError(f"no frame was shown {span.within}, so there was nothing to answer")
-        measures = measure(target, times, values, self._limits, judged, frames, hidden, self._is_copied)
+        about = self._limits, judged, frames, hidden, self._is_copied
+        measures = measure(target, times, values, *about)
         if self._limits.sign_share is not None and measures.samples and measures.sign_share is None:
             raise UnjudgeableError(f"the target is nowhere farther than {self._limits.floor:g} from 0: it has no sign")
         said = verdict(self._signal, target, measures, self._limits, span.within, self._late.facts(start))
         self.notes = [*self._notes(measures)]
+        blind = measure(target, times, np.zeros(len(values)), *about).checks(self._limits)
+        if said.outcome == "passed" and all(check.ok for check in blind):
+            self.notes.append("a signal that is always 0 keeps all limits, too")
         return replace(said, evidence=measures.evidence())
 
     def _notes(self, measures: SignalMeasures) -> Iterator[str]:

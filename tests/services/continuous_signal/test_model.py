@@ -345,12 +345,19 @@ def test_a_verdict_is_noted_that_says_nothing_of_a_blind_or_late_signal(
     value: Callable[[float], float], delay: float, notes: list[str]
 ) -> None:
     target = Target(np.array([0, 3 * SECOND, 10 * SECOND]), np.array([0.3, 0.0, 0.7]))
-    it = judge(SignalLimits(delay=SECOND), target)
+    it = judge(SignalLimits(distance=0.65, delay=SECOND), target)
     for step in range(101):
         it.arrived = BEGIN + step * SECOND // 10 + round(delay * SECOND)
         hear(it, (step / 10, value(step / 10)))
     decided(it)
     assert it.notes == [each.format(SIGNAL) for each in notes]
+
+
+def test_limits_that_0_keeps_are_noted() -> None:
+    it = judge(SignalLimits(distance=1.0))
+    hear(it, *((step / 10, step / 100) for step in range(101)))
+    assert decided(it).outcome == "passed"
+    assert it.notes == ["a signal that is always 0 keeps all limits, too"]
 
 
 @pytest.mark.parametrize(("sent", "is_kept"), [(0.3, True), (0.29999998, True), (0.30000004, False)])
