@@ -133,13 +133,6 @@ def make_solids(faces: list[Face], tree: Tree) -> Iterator[Solid]:
         yield Solid(Tree(parts, by_area=False), leaf, middle, float(np.linalg.norm(points - middle, axis=1).max()))
 
 
-def too_large(group: list[int], count: int) -> bool:
-    """Whether a group has too many faces to be cut up, which is logged."""
-    if count > MAX_FACES:
-        _log.warning("%d models that intersect have %d faces, more than %d: not cut up", len(group), count, MAX_FACES)
-    return count > MAX_FACES
-
-
 SMALL = 8.0
 """Copies of a smaller radius, in pixels, are drawn as silhouettes."""
 INVISIBLE = 0.3
@@ -203,7 +196,9 @@ class Bodies:
         bodies = pierced(faces, corners, middles, radii)
         for group in groups(bodies, overlapping(corners, middles, radii)):
             parts = [face for body in group for face in self._faces(body)]
-            if not too_large(group, len(parts)):
+            if len(parts) > MAX_FACES:
+                _log.warning("%d models that intersect have %d faces, too many to be cut up", len(group), len(parts))
+            else:
                 self._radius[group] = 0.0
                 yield from make_solids(parts, tree)
 

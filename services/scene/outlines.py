@@ -270,16 +270,14 @@ class Outlines:
         files = dict.fromkeys(model.file for model in self._map.models)
         self._meshes = {file: Mesh.load(file) for file in files}
         self.moving: dict[int, Mesh] = dict(self._moving(own))
-        self._cuts: dict[float, Cut] = {}
 
     def at(self, height: float) -> Cut:
         """What stands still, at a height above the world's origin."""
-        height = round(height, 4)
-        if height not in self._cuts:
-            if len(self._cuts) >= _HEIGHTS:
-                self._cuts.clear()
-            self._cuts[height] = Cut.of([*self._models(height), *self._blocks(height), *self._lines()])
-        return self._cuts[height]
+        return self._standing(round(height, 4))
+
+    @lru_cache(maxsize=_HEIGHTS)  # noqa: B019 - as of meshes
+    def _standing(self, height: float) -> Cut:
+        return Cut.of([*self._models(height), *self._blocks(height), *self._lines()])
 
     def bodies_at(self, height: float, places: Mapping[int, Place]) -> Iterator[Cut]:
         """The models that move, at a height, those of them whose places are known."""

@@ -63,7 +63,8 @@ class SceneTruth:
     def __init__(
         self, renderer: Renderer, classes: Mapping[str, str], limits: TruthLimits, lens: Lens | None = None
     ) -> None:
-        self.renderer, self._classes, self._limits, self._lens = renderer, classes, limits, lens
+        self.renderer, self.classes, self._limits, self._lens = renderer, classes, limits, lens
+        self.camera = lens.camera if lens else renderer.camera
 
     def boxes(self, pose: CameraPose) -> list[TrueBox]:
         """All boxes that keep within the limits, by number; ``pose`` is the camera's in the world."""
@@ -73,9 +74,9 @@ class SceneTruth:
         mask = np.zeros(labels.shape, np.uint8)
         names = self.renderer.bodies.names
         found = [
-            self._box(view, body, self._classes[names[body]], drawn[body], int(seen[body]), mask)
+            self._box(view, body, self.classes[names[body]], drawn[body], int(seen[body]), mask)
             for body in sorted(drawn)
-            if seen[body] and names[body] in self._classes
+            if seen[body] and names[body] in self.classes
         ]
         return [box for box in found if box is not None]
 
@@ -125,12 +126,10 @@ def _alone(pieces: list[Piece], mask: Image) -> int:
 class TruthSender:
     """Sends true boxes as OpenDLV's detections, under its own sender stamp."""
 
-    def __init__(
-        self, truth: SceneTruth, classes: Iterable[str], camera: Pinhole, messages: MessageSet, stamp: int
-    ) -> None:
-        self._truth, self._camera, self._stamp = truth, camera, stamp
+    def __init__(self, truth: SceneTruth, messages: MessageSet, stamp: int) -> None:
+        self._truth, self._stamp = truth, stamp
         self.renderer = truth.renderer
-        self._types = {name: number for number, name in enumerate(dict.fromkeys(classes), start=1)}
+        self._types = {name: number for number, name in enumerate(dict.fromkeys(truth.classes.values()), start=1)}
         names = ("DetectionType", "DetectionProperty", "DetectionBoundingBox")
         self._kinds = [messages.type(f"opendlv.logic.perception.{name}") for name in names]
 
@@ -145,7 +144,7 @@ class TruthSender:
 
     def _messages(self, box: TrueBox) -> tuple[Message, ...]:
         kind, name, place = self._kinds
-        wide, high = self._camera.width, self._camera.height
+        wide, high = self._truth.camera.width, self._truth.camera.height
         fractions = {"x": box.left / wide, "y": box.top / high, "width": box.width / wide, "height": box.height / high}
         return (
             kind(detectionId=box.number, type=self._types[box.name]),
@@ -154,11 +153,11 @@ class TruthSender:
         )
 
 
-def open_truth(flags: Flags, renderer: Renderer, lens: Lens | None) -> tuple[SceneTruth, dict[str, str]]:
-    """What knows the true boxes, and the classes by model; raises ValueError for a model that the map lacks."""
+def open_truth(flags: Flags, renderer: Renderer, lens: Lens | None) -> SceneTruth:
+    """What knows the true boxes; raises ValueError for a model that the map lacks."""
     classes = classes_of(flags["truth-classes"], renderer.bodies.names)
     limits = TruthLimits(flags["truth-min-visible"], flags["truth-min-height"])
-    return SceneTruth(renderer, classes, limits, lens), classes
+    return SceneTruth(renderer, classes, limits, lens)
 
 
 def truth_sender(context: Context, renderer: Renderer, lens: Lens | None) -> TruthSender | None:
@@ -166,6 +165,4 @@ def truth_sender(context: Context, renderer: Renderer, lens: Lens | None) -> Tru
     stamp = context.flags["truth-sender"]
     if stamp is None:
         return None
-    truth, classes = open_truth(context.flags, renderer, lens)
-    camera = lens.camera if lens else renderer.camera
-    return TruthSender(truth, classes.values(), camera, context.messages, stamp)
+    return TruthSender(open_truth(context.flags, renderer, lens), context.messages, stamp)

@@ -31,7 +31,7 @@ def _draw(words: list[str]) -> tuple[Image, dict[str, Any]]:
     start = () if any(word.startswith("--start-") for word in words) else ORIGIN
     flags = parse(load_manifest(Path(__file__).parent), [*words, *start, "--cid=1"])
     renderer, optics = open_scene(flags)
-    truth, _ = open_truth(flags, renderer, optics.lens)
+    truth = open_truth(flags, renderer, optics.lens)
     pictures: list[Image] = []
     camera = mounted_camera(flags, renderer, optics, lambda argb, _i420, _now: pictures.append(argb))
     pose = camera.update(NOW)
