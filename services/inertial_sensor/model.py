@@ -14,6 +14,7 @@ from dodo_dsl.opendlv.envelope import MICROSECONDS
 from services.base import UnusableMessageError
 
 Array = NDArray[np.float64]
+_NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 def attitude(qx: float, qy: float, qz: float, qw: float) -> Array:
@@ -39,6 +40,12 @@ class BodyState(NamedTuple):
     rates: Array
 
 
+def _cross(a: Array, b: Array) -> Array:
+    """As ``np.cross``, which takes ten times as long for one pair."""
+    product: Array = a[_NEXT] * b[_AFTER] - a[_AFTER] * b[_NEXT]
+    return product
+
+
 def acceleration_of(before: BodyState, after: BodyState, lever: Array) -> Array:
     """The mean acceleration along the body's axes (m/s2) of a point at ``lever`` (m), from one state to another.
 
@@ -47,7 +54,7 @@ def acceleration_of(before: BodyState, after: BodyState, lever: Array) -> Array:
     per_second = MICROSECONDS / (after.time - before.time)
     velocity, rates = (before.velocity + after.velocity) / 2, (before.rates + after.rates) / 2
     slower, turning = per_second * (after.velocity - before.velocity), per_second * (after.rates - before.rates)
-    around: Array = np.cross(turning, lever) + np.cross(rates, velocity + np.cross(rates, lever))
+    around: Array = _cross(turning, lever) + _cross(rates, velocity + _cross(rates, lever))
     return slower + around
 
 
