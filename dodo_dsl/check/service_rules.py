@@ -14,7 +14,6 @@ from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Reader, Scalar, Sequence, walk
 from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService
 from dodo_dsl.spec.manifest import MANIFEST, holds
-from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, Rig
 from dodo_dsl.spec.slips import meant, unknown_key
 
 
@@ -240,27 +239,17 @@ _OPTICS = "camera.intrinsics"
 
 
 def check_cameras(context: RuleContext) -> Iterator[Diagnostic]:
+    """Services that take optics from the rig and work on frames of another size."""
     rig = context.rig
-    for service in context.services:
-        yield from _size(rig, service)
-        for argument in service.arguments.values():
-            is_drawn = argument.parameter.rig == CAMERA_SOURCE and argument.text == EMULATED
-            if is_drawn and rig is not None and not rig.is_emulated:
-                message = f"rig '{rig.name}' is hardware, and an emulated camera sees nothing of it"
-                span = argument.entry.value.span if argument.entry else service.use.span
-                yield Diagnostic(span, "camera-source", message, "write a device such as /dev/video0, or rpicam")
-
-
-def _size(rig: Rig | None, service: ResolvedService) -> Iterator[Diagnostic]:
-    """A service that takes optics from the rig and works on frames of another size."""
-    taken = (a.parameter for a in service.arguments.values() if (a.parameter.rig or "").startswith(_OPTICS))
-    if rig is None or not any(p.name not in service.use.parameters and rig.entry(p.rig or "") for p in taken):
-        return
-    measured = [rig.text(f"{_OPTICS}.{name}") for name in ("width", "height")]
-    given = [service.texts.get(name, "") for name in ("width", "height")]
-    if all(measured) and all(given) and measured != given:
-        where = service.use.parameters.get("width") or rig.entry(f"{_OPTICS}.width")
-        message = f"the camera of rig '{rig.name}' was measured in frames of {' x '.join(measured)}, "
-        message += f"and '{service.use.name}' has them of {' x '.join(given)}"
-        hint = f"measure it again with 'dodo rig measure {rig.name} --camera', or take frames of the measured size"
-        yield Diagnostic(where.value.span if where else service.use.span, "camera-size", message, hint)
+    for service in context.services if rig else ():
+        assert rig is not None
+        taken = (a.parameter for a in service.arguments.values() if (a.parameter.rig or "").startswith(_OPTICS))
+        measured = [rig.text(f"{_OPTICS}.{name}") for name in ("width", "height")]
+        given = [service.texts.get(name, "") for name in ("width", "height")]
+        has_optics = any(p.name not in service.use.parameters and rig.entry(p.rig) for p in taken)
+        if has_optics and all(measured) and all(given) and measured != given:
+            where = service.use.parameters.get("width") or rig.entry(f"{_OPTICS}.width")
+            message = f"the camera of rig '{rig.name}' was measured in frames of {' x '.join(measured)}, "
+            message += f"and '{service.use.name}' has them of {' x '.join(given)}"
+            hint = f"measure it again with 'dodo rig measure {rig.name} --camera', or take frames of the measured size"
+            yield Diagnostic(where.value.span if where else service.use.span, "camera-size", message, hint)

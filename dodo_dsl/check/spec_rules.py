@@ -11,11 +11,10 @@ from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, shown_path
 from dodo_dsl.source import Entry, Mapping, Scalar, plain
 from dodo_dsl.spec.arguments import Argument
 from dodo_dsl.spec.deployment import RESERVED_CIDS, Deployment
-from dodo_dsl.spec.load import members
 from dodo_dsl.spec.model import Goal, Use
 from dodo_dsl.spec.quantity import SHARE, QuantityError, convert
 from dodo_dsl.spec.registry import KEYWORDS, SUFFIX, is_free, is_name
-from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, EMULATED_RIGS, KIND_TAGS, MEMORY, PORT, Rig, is_simulated
+from dodo_dsl.spec.rig import EMULATED, EMULATED_RIGS, KIND_TAGS, MEMORY, PORT, is_simulated
 
 
 def check_names(context: RuleContext) -> Iterator[Diagnostic]:
@@ -67,24 +66,6 @@ def check_clock_rates(context: RuleContext) -> Iterator[Diagnostic]:
 
 def _near(rate: float, step: float) -> float:
     return step * round(rate / step) if rate > step else step / round(step / rate)
-
-
-def check_pools(context: RuleContext) -> Iterator[Diagnostic]:
-    spec, found = context.spec, members(context.spec.pool, context.deployment.rigs)
-    for number, rig in enumerate(found):
-        for other in found[:number]:
-            if device := _same_device(other, rig):
-                message = (
-                    f"rigs '{other.name}' and '{rig.name}' both have '{device}', so it is unknown which one is there"
-                )
-                hint = "name ports by their serial numbers, as /dev/serial/by-id/... does"
-                yield Diagnostic(spec.span("rig"), "rig-pool", message, hint)
-
-
-def _same_device(one: Rig, other: Rig) -> str:
-    """What distinguishes rigs, where both have the same: the port, or the camera of rigs without one."""
-    own = one.text(PORT) or one.text(CAMERA_SOURCE)
-    return own if own != EMULATED and own == (other.text(PORT) or other.text(CAMERA_SOURCE)) else ""
 
 
 def check_rigs(context: RuleContext) -> Iterator[Diagnostic]:

@@ -262,7 +262,7 @@ class _Reading:
             found = rigs[name] = Rig(name, raw.get("kind", "dynamic"), cid, written.value)
             if cid is not None and name in rig.EMULATED_RIGS:
                 message = f"the name '{name}' is reserved for the built-in rig"
-                self._tell(written.key, "rig-name", message, "choose another name")
+                self._tell(written.key, "wrong-value", message, "choose another name")
             elif cid not in (None, _NO_CID) and (cid in taken or cid in RESERVED_CIDS):
                 owner = f"rig '{taken[cid]}'" if cid in taken else "real cars"
                 message = f"CID {cid} is taken by {owner}, expected one that only this rig has"
@@ -271,7 +271,7 @@ class _Reading:
             for item in _texts(written.value.get("tags")):
                 if item.text in rig.RESERVED_TAGS - {*rig.KIND_TAGS[found.kind]}:
                     message = f"'{item.text}' is the tag of other runners, those of rig '{name}' have '{found.tag}'"
-                    self._tell(item.span, "rig-tag", message, "remove it, or choose the rig's own tag")
+                    self._tell(item.span, "wrong-value", message, "remove it, or choose the rig's own tag")
         return rigs
 
     def _cids(self) -> tuple[int, ...]:
