@@ -4,12 +4,8 @@ A service has a name and a program; together they have cycles of dependencies, a
 """
 
 import difflib
-import os
-import re
-import shlex
 from collections.abc import Collection, Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
-from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags, stack
@@ -29,13 +25,9 @@ from dodo_dsl.application.model import (
 )
 from dodo_dsl.application.variables import variables_of
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix, shown_path
-from dodo_dsl.source import Node, Scalar
+from dodo_dsl.source import Node
 
-_GIVE_CID = "add --cid=111 to its command, or declare the one that is built in: x-dodo: {cid: 111}"
-_IN_ONE_WORD = re.compile(r"--cid[ ]+(?P<value>[^ ]+)")
-_LITERAL = re.compile(r"--cid=(?P<value>[\w.+-]+)")
 _HIGHEST = 254
-_INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
 
 
 def application_problems(
@@ -51,9 +43,9 @@ def application_problems(
     for name, service in application.services.items():
         container = construction.containers[name]
         container.made()
-        own = [*_name(service), *_missing_program(service, application.folder), *container.problems]
+        own = [*_name(service), *container.problems]
         part = of_stack.get(name)
-        found.extend([stack.problem(application, name, part, has_errors(own))] if part else own)
+        found.extend([stack.problem(service, part, [*of_stack], has_errors(own))] if part else own)
     found.extend(construction.check())
     found.extend(_cycles(application))
     found.extend(_same_variable(application))
@@ -97,13 +89,12 @@ def _several_cids(application: ApplicationSource, of_stack: Collection[str]) -> 
             place = (declared_cid(service.node) or service).span
             buses.append((f"'{service.name}' is on CID {numbers}", place, cids))
     others = on_other_buses([cids for _, _, cids in buses])
-    gone = [*application.without, *of_stack, *(s.name for s in own if written_cids(s, application) in others)]
     for what, span, cids in buses:
         if cids in others:
             first = f"{buses[0][0]} in {shown_path(buses[0][1].file)}:{buses[0][1].line}"
-            hint = f"leave out what is not under test, as dodo.yml can: {stack.way_out(application.named, gone)}"
             message = f"{what}, and {first}: a test has one bus"
-            yield Diagnostic(span, "application-cid", message, f"{hint}; or write one CID everywhere")
+            hint = "leave it out in dodo.yml: application: {files: [...], without: [...]}; or write one CID everywhere"
+            yield Diagnostic(span, "application-cid", message, hint)
         elif len(cids) > 1:
             hint = "leave it out in dodo.yml if it passes on messages between them"
             yield Diagnostic(span, "application-cid", f"{what}, which are one bus in a test", hint, "warning")
@@ -129,22 +120,11 @@ def written_cids(service: ComposeService, application: ApplicationSource) -> set
 
 
 def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
-    """Warnings of flags that give no CID, of services with messages that take none, and of none that does."""
     services = application.services.values()
-    slips = {service.name: list(_cid_slips(service)) for service in services}
-    yield from (slip for found in slips.values() for slip in found)
-    if application.cid is not None:
-        return
-    without = [service for service in services if not slips[service.name] and not takes_cid(service)]
-    if len(without) == len(services) and not application.speaks_ros:
+    if application.cid is None and not application.speaks_ros and not any(map(takes_cid, services)):
         message = "no service takes a CID (--cid=, CID or OD4SESSION_CID), so every test runs with the built-in one"
-        yield Diagnostic(without[0].span, "application-cid", message, _GIVE_CID, "warning")
-        return
-    for service in without:
-        own = service.declared
-        if own and not own.topics and (own.inputs or own.outputs):
-            message = f"'{service.name}' has messages, but takes no CID (--cid=, CID or OD4SESSION_CID)"
-            yield Diagnostic(service.span, "application-cid", message, _GIVE_CID, "warning")
+        hint = "add --cid=111 to its command, or declare the one that is built in: x-dodo: {cid: 111}"
+        yield Diagnostic(next(iter(services)).span, "application-cid", message, hint, "warning")
 
 
 def takes_cid(service: ComposeService) -> bool:
@@ -178,42 +158,6 @@ def _bad(span: Span, message: str, hint: str = "") -> Diagnostic:
     return Diagnostic(span, "application-file", message, hint)
 
 
-def _cid_slips(service: ComposeService) -> Iterator[Diagnostic]:
-    """Words that are meant to give a CID, and give none."""
-    for word, item in service.words:
-        one, literal = _IN_ONE_WORD.fullmatch(word), _LITERAL.fullmatch(word)
-        if one:
-            yield _warning(item, f"'{word}' is one word, which no program reads", f"write '--cid={one['value']}'")
-        elif literal and not _is_cid(literal["value"]):
-            yield _warning(item, f"'{word}' gives no CID, expected a number from 1 to {_HIGHEST}", "write '--cid=111'")
-
-
 def _is_cid(value: str) -> bool:
     """Whether a text is a whole number from 1 to 254."""
     return value.isascii() and value.isdigit() and len(value) < 9 and 1 <= int(value) <= _HIGHEST
-
-
-def _warning(item: Scalar, message: str, hint: str) -> Diagnostic:
-    return Diagnostic(item.span, "application-cid", message, hint, "warning")
-
-
-def _missing_program(service: ComposeService, folder: Path) -> Iterator[Diagnostic]:
-    """A warning of a program or a script that is not there, as seen from the compose file's ``folder``."""
-    process = service.node.get("x-dodo-process")
-    words = [word for word in process.items if isinstance(word, Scalar)] if isinstance(process, source.Sequence) else []
-    is_script = bool(words) and words[0].text in _INTERPRETERS
-    word = words[is_script] if len(words) > is_script else None
-    if word is None or "$" in word.text or word.text.startswith("-"):
-        return
-    own, name = folder / word.text, word.text
-    message = hint = ""
-    if is_script and not own.is_file():
-        message = f"there is no file '{name}' for {words[0].text} to run"
-        hint = "without it the application starts in containers only"
-    elif not is_script and "/" in name and own.is_file() and not os.access(own, os.X_OK):
-        message, hint = f"'{name}' is not executable", f"run: chmod +x {shlex.quote(shown_path(str(own)))}"
-    elif not is_script and {"/", " "} & {*name} and not own.exists() and "build" not in service.node.entries:
-        message = f"there is no program '{name}'"
-        hint = f"a program is one word: write [{', '.join(name.split())}]" if " " in name else "build it first"
-    if message:
-        yield Diagnostic(word.span, "application-file", message, hint, "warning")

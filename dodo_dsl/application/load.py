@@ -1,11 +1,7 @@
-"""All files of an application merged into one document, with what they extend and include.
-
-``docker compose`` also reads files that it finds next to those that DoDo was given: a warning names them.
-"""
+"""All files of an application merged into one document, with what they extend and include."""
 
 import functools
 import os
-import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +11,7 @@ from dodo_dsl import source
 from dodo_dsl.application import merge
 from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.application.model import scalars, with_entry
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
+from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.source import Entry, Node, Scalar
 
 MAX_DEPTH = 8
@@ -184,24 +180,3 @@ def _base(files: ComposeFiles, entry: Entry, chain: tuple[Service, ...]) -> Node
     elif document:
         files.problem(word.span, f"unknown service '{base.name}' to extend", did_you_mean(base.name, entries))
     return None
-
-
-_PLAIN = re.compile(r"[\w./-]+")
-_OVERRIDDEN = re.compile(r"(docker-)?compose\.ya?ml")
-
-
-def unread(paths: Sequence[Path], root: Path) -> Iterator[Diagnostic]:
-    """A warning if compose would read override files together with ``paths``; its hint names files as ``root`` does."""
-    first = paths[0]
-    found = sorted(path for path in first.parent.glob("*compose.override.y*ml") if path not in paths)
-    if _OVERRIDDEN.fullmatch(first.name) and len(paths) == 1 and found:
-        message = f"'docker compose' also reads '{found[0].name}', which it finds next to this file; DoDo does not"
-        hint = f"write application: [{as_item(first, root)}, {as_item(found[0], root)}] in dodo.yml; to test without "
-        hint += f"it, name another file there that has include: [{first.name}]"
-        yield Diagnostic(Span(str(first)), "application-override", message, hint, "warning")
-
-
-def as_item(path: Path, folder: Path) -> str:
-    """A path as an item of a list in YAML."""
-    text = os.path.relpath(path, folder)
-    return text if _PLAIN.fullmatch(text) else f'"{text}"'

@@ -146,9 +146,8 @@ class ApplicationSource:
     ``services`` are those that start, by name. Paths are relative to ``folder``. ``dropped`` has the reasons why
     services do not start, by name, ``shown`` the paths of the host that it asks for, and ``secrets`` the
     files that set variables which no compiled test holds. ``known`` are all variables whose values are known,
-    ``access`` is what the deployment allows, ``limits`` are the highest that the services may set. ``named`` are the
-    files as ``dodo.yml`` names them, ``without`` the services that it leaves out. ``cids`` are declared to be built
-    in, all the same one. ``top`` has all top-level keys.
+    ``access`` is what the deployment allows, ``limits`` are the highest that the services may set. ``cids`` are
+    declared to be built in, all the same one. ``top`` has all top-level keys.
     """
 
     path: Path
@@ -160,8 +159,6 @@ class ApplicationSource:
     access: Access = field(default_factory=Access)
     limits: SandboxLimits = field(default_factory=SandboxLimits)
     top: Mapping[str, source.Entry] = field(default_factory=dict)
-    named: tuple[str, ...] = ()
-    without: tuple[str, ...] = ()
     cids: tuple[Scalar, ...] = ()
 
     @property

@@ -19,7 +19,7 @@ from dodo_dsl.application.construction import Construction, Setting
 from dodo_dsl.application.container import is_carried
 from dodo_dsl.application.host_paths import INSIDE, link_out, repository
 from dodo_dsl.application.interpolation import names
-from dodo_dsl.application.load import as_item, load, unread
+from dodo_dsl.application.load import load
 from dodo_dsl.application.merge import joined
 from dodo_dsl.application.model import (
     KEYS,
@@ -83,8 +83,7 @@ def read_application(
     if not any(p.rule != "unknown-key" for p in found if p.severity == "error"):
         found.extend(validate(document, "application"))
     if has_errors(found):
-        return None, list(_explained(found, document, files))
-    root = Path(access.roots[0]) if access.roots else None
+        return None, found
     dropped = {name: why for name, entry in services.items() if (why := _why_dropped(plain(entry.value)))}
     started = {name: entry for name, entry in services.items() if name not in dropped}
     containers = {
@@ -102,17 +101,12 @@ def read_application(
         access=access,
         limits=limits,
         top=document.entries,
-        named=tuple(as_item(path.resolve(), (root or paths[0].parent).resolve()) for path in paths),
-        without=tuple(gone),
         cids=tuple(filter(None, map(declared_cid, [document, *(service.node for service in kept.values())]))),
     )
-    found.extend(() if "COMPOSE_FILE" in files.known else unread(paths, root or paths[0].parent))
     construction = Construction(application, Setting(1, "network", application.folder, limits=limits))
     found.extend(application_problems(application, construction, next(iter(services.values())).key))
     found.extend(tunable_problems(application))
-    refused = {problem.span for problem in found}
-    more = (*_withheld(application, files), *_empty(application, files))
-    found = [*_explained(found, document, files), *(p for p in more if p.span not in refused)]
+    found += [*_withheld(application, files), *_empty(application, files)]
     if application.speaks_ros:
         node = bridge()
         raw = {"command": node.entries["command"].value}
@@ -222,16 +216,6 @@ def _unset(span: Span, files: ComposeFiles) -> list[str]:
     """The variables in what is written at a place that have no value there, and are not DoDo's own."""
     known = {*files.known, *files.secrets, *files.passed, *os.environ, *_OF_FOLDER}
     return sorted(files.unset.get(span, set()) - known)
-
-
-def _explained(problems: Sequence[Diagnostic], document: Node, files: ComposeFiles) -> Iterator[Diagnostic]:
-    """Problems with the variable for want of which a text is as it is."""
-    parts = source.walk(document) if problems else ()
-    values = {e.key: e.value.span for part in parts if isinstance(part, Mapping) for e in part.entries.values()}
-    for problem in problems:
-        unset = _unset(values.get(problem.span, problem.span), files)
-        message = f"variable '{unset[0]}' has no value: {problem.message}" if unset else problem.message
-        yield replace(problem, message=message)
 
 
 def _empty(application: ApplicationSource, files: ComposeFiles) -> Iterator[Diagnostic]:

@@ -63,11 +63,6 @@ def test_services_that_do_not_start(root: Path) -> None:
 @pytest.mark.parametrize(
     ("service", "rule"),
     [
-        ({"x-dodo-process": ["python", "drive.py"]}, "application-file"),
-        ({"x-dodo-process": ["python", "here.py"]}, ""),
-        ({"x-dodo-process": ["python", "-m", "drive"]}, ""),
-        ({"x-dodo-process": ["build/drive"], "build": "."}, ""),
-        ({"x-dodo-process": ["./three"]}, ""),
         ({"build": "."}, ""),
         ({"build": {"context": "${FOLDER:-data}"}}, ""),
         ({"env_file": ["gone.env", {"path": "b.txt", "required": False}]}, "application-file"),
