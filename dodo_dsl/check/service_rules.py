@@ -74,7 +74,7 @@ def _written(service: ResolvedService) -> Iterator[Diagnostic]:
         argument = service.arguments.get(name)
         if argument is None:
             known = service.manifest.parameters
-            slip, hint, fix = unknown_key(name, known, service.use.parameters, is_empty=_is_empty(entry))
+            slip, hint, fix = unknown_key(name, known, service.use.parameters)
             message = slip or f"service '{service.manifest.name}' has no parameter '{name}'"
             yield Diagnostic(entry.key, "unknown-parameter", message, hint, fix=fix)
         elif argument.problem:
@@ -97,15 +97,10 @@ def _without_effect(service: ResolvedService, argument: Argument, entry: Entry) 
     return Diagnostic(entry.key, "unused-parameter", message, f"remove it, or write {wanted}")
 
 
-def _is_empty(entry: Entry) -> bool:
-    return isinstance(entry.value, Scalar) and entry.value.value is None
-
-
 def _misspelt(service: ResolvedService) -> set[str]:
     """The parameters that unknown ones most likely mean, which are not missing as well."""
     known = service.manifest.parameters
-    unknown = ((name, entry) for name, entry in service.use.parameters.items() if name not in known)
-    return {meant(name, known, is_empty=_is_empty(entry)) for name, entry in unknown}
+    return {meant(name, known) for name in service.use.parameters if name not in known}
 
 
 def _needs(service: ResolvedService, name: str) -> bool:

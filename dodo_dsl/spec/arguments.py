@@ -11,13 +11,13 @@ from typing import Literal
 
 from dodo_dsl.diagnostics import Diagnostic, Fix, did_you_mean, only_fix
 from dodo_dsl.opendlv.assets import map_file
-from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, path_of, resolve, walk
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, path_of, walk
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.manifest import FRAMES, Manifest, Parameter, Ports, holds
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.registry import near_path
 from dodo_dsl.spec.rig import Rig
-from dodo_dsl.spec.slips import boolean_meant, repaired
+from dodo_dsl.spec.slips import boolean_meant
 
 Kind = Literal["text", "path", "memory"]
 
@@ -110,8 +110,7 @@ def _bare_number(parameter: Parameter, scalar: Scalar) -> Decimal:
             return number
     expected = "a whole number" if is_whole else "a finite number"
     rule = "wrong-unit" if re.match(r"[-+.]*\d[.\d]*\s*[A-Za-z%]", scalar.text) else "wrong-type"
-    hint, fix = repaired(scalar.text, lambda text: type(resolve(text.strip())) in (int, float))
-    raise ValueProblem(parameter, scalar, rule, f" is '{scalar.text}', expected {expected} without a unit", hint, fix)
+    raise ValueProblem(parameter, scalar, rule, f" is '{scalar.text}', expected {expected} without a unit")
 
 
 def _bounded(parameter: Parameter, scalar: Scalar, number: Decimal) -> Value:

@@ -20,7 +20,6 @@ from dodo_dsl.spec.manifest import MANIFEST
 from dodo_dsl.spec.registry import refuse_yaml
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.slips import mended
 from dodo_dsl.spec.validation import schema_of_keys, valid_part, values
 
 _TAKEN = ("services", "dodo_dsl")
@@ -123,9 +122,8 @@ def load_deployment(path: Path | None, reader: Reader = read) -> tuple[Deploymen
     if node is None and not found:
         found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected at least 'dodo: 1'")]
     if node is not None:
-        node, slipped = mended(node, schema_of_keys("deployment"))
         node, problems, _ = valid_part(node, "deployment")
-        found = [*found, *slipped, *problems]
+        found = [*found, *problems]
     if not isinstance(node, Mapping):
         return Deployment(path.parent, path, registry=(package_data.registry(),)), found
     reading = _Reading(path.parent, node)

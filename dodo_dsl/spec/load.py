@@ -11,7 +11,7 @@ from pathlib import Path
 
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, shown_path
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, path_of, read
-from dodo_dsl.spec import matrix, slips, vary
+from dodo_dsl.spec import matrix, vary
 from dodo_dsl.spec.matrix import MATRIX, Choice, Placeholders, without
 from dodo_dsl.spec.model import LAYERS, Spec, spec_of
 from dodo_dsl.spec.registry import Location, near_path
@@ -37,9 +37,8 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
     node, found = reader(location.path)
     if node is None:
         return [Spec(location)], found or [_nothing_in(location.path)]
-    node, slipped = slips.mended(node, schema_of_keys("dodo"))
     node, problems = resolve(node, location.path, location.root, reader)
-    found, is_whole = [*found, *slipped, *problems], not has_errors(problems)
+    found, is_whole = [*found, *problems], not has_errors(problems)
     if isinstance(node, Mapping) and EXTENDS in node.entries:
         return [_by_name(location, node)], [*found, *_surely_wrong(node)]
     if not isinstance(node, Mapping):

@@ -4,7 +4,6 @@ import re
 from decimal import Decimal, InvalidOperation, localcontext
 
 from dodo_dsl.diagnostics import Fix, did_you_mean, only_fix
-from dodo_dsl.spec.slips import repaired, unit_meant
 
 SHARE = "1"
 """The unit of shares, which need none: 0.5 is 50 %."""
@@ -75,17 +74,13 @@ def convert(value: object, unit: str) -> Decimal:
     match = _QUANTITY.fullmatch(text) if len(text) <= _MAX_TEXT else None
     written = (match["unit"] or (SHARE if unit == SHARE else "")) if match else None
     if match is None or (unit == SHARE and written not in siblings):
-        hint, fix = repaired(text, lambda other: _is_quantity(other, unit)) if len(text) <= _MAX_TEXT else ("", None)
-        shown, point = text if len(text) <= _MAX_TEXT else f"{text[:20]}...", text.replace(",", ".", 1)
-        if not hint and point != text and _is_quantity(point, unit):
-            hint = f"write '{point}', with a point"
-        raise QuantityError(f"'{shown}' is not {expected}", hint or _example("1", unit), fix)
+        shown = text if len(text) <= _MAX_TEXT else f"{text[:20]}..."
+        point = with_point(text) if (written_unit(text.replace(",", ".", 1)) or SHARE) in siblings else ""
+        raise QuantityError(f"'{shown}' is not {expected}", point or _example("1", unit))
     if not written:
         raise QuantityError(f"'{text}' has no unit, expected {_a(_DIMENSION[unit])} in {unit}", _example(text, unit))
     if written not in _DIMENSION:
-        fix = unit_meant(written, text, siblings)
-        hint = f"did you mean '{fix.new.strip()}'?" if fix else did_you_mean(written, siblings)
-        raise QuantityError(f"unknown unit '{written}'", hint, fix or only_fix(written, siblings))
+        raise QuantityError(f"unknown unit '{written}'", did_you_mean(written, siblings), only_fix(written, siblings))
     if written not in siblings:
         message = f"'{text}' is {_a(_DIMENSION[written])}, expected {_a(_DIMENSION[unit])} in {unit}"
         raise QuantityError(message, _example(match["number"], unit))
@@ -103,14 +98,6 @@ def in_base_unit(text: str) -> Decimal:
         hint = with_point(text) or "write for example 0.05 or '0.05 rad'"
         raise QuantityError(f"'{text[:_MAX_TEXT]}' is not a number or a quantity", hint)
     return convert(text, next(iter(_FACTORS[dimension])))
-
-
-def _is_quantity(text: str, unit: str) -> bool:
-    try:
-        convert(text, unit)
-    except QuantityError:
-        return False
-    return True
 
 
 def with_point(text: str) -> str:

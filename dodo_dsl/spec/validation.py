@@ -19,7 +19,7 @@ from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, only_fix, sh
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain, resolve
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.matrix import REPORTED
-from dodo_dsl.spec.slips import boolean_meant, in_line, meant, repaired, schema_at, to_write, unknown_key
+from dodo_dsl.spec.slips import boolean_meant, home, in_line, meant, schema_at, to_write, unknown_key
 
 OF_COMPOSE = "application"
 UNIT, RANGE, WORDS, EXPECT = "x-unit", "x-range", "x-words", "x-expect"
@@ -141,7 +141,8 @@ class Violation:
         is_of_key = error.kind.name == "propertyNames"
         self.instance: Any = error.kind.error.instance if is_of_key else error.instance
         self.of_key: str | None = self.instance if is_of_key else None
-        around = self.schema if self.path else schema_of_keys(name)
+        self.top = schema_of_keys(name)
+        around = self.schema if self.path else self.top
         self.known, self.is_closed = around.get("properties", {}), around.get("additionalProperties") is False
         self._find(root)
 
@@ -258,24 +259,29 @@ def _fits(schema: dict[str, Any], value: object) -> bool:
 def _additional(v: Violation) -> Iterator[Diagnostic]:
     known = v.schema.get("properties", {})
     for *_, name in itertools.islice(v.places, MAX_PROBLEMS):
-        is_empty = v.instance[name] is None
-        slip, hint, fix = unknown_key(str(name), known, v.instance, is_empty=is_empty)
-        if set(known) == {"uses", "with"} and not fix and not slip:
+        slip, hint, fix = unknown_key(str(name), known, v.instance)
+        if not fix and not slip and set(known) == {"uses", "with"}:
             hint = f"parameters of a service belong into 'with': {{{name}: ...}}"
+        elif not slip:
+            hint = home(str(name), v.entries, v.schema) or hint
         message = slip or f"unknown key {_shown(name)}"
         yield Diagnostic(v.entries[str(name)].key, "unknown-key", message, hint, fix=fix)
 
 
 def _required(v: Violation) -> Iterator[Diagnostic]:
     missing, known = v.wanted, v.known
-    unknown = {name: value for name, value in v.instance.items() if name not in known}
-    if v.is_closed and missing in (meant(name, known, is_empty=value is None) for name, value in unknown.items()):
+    unknown = [name for name in v.instance if name not in known]
+    if v.is_closed and any(meant(name, known) == missing for name in unknown):
         return  # it is reported as an unknown key
     if not v.is_closed and (almost := next((name for name in unknown if only_fix(name, [missing])), "")):
         hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
         yield Diagnostic(v.entries[almost].key, "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
         return
     hint = to_write(missing, known.get(missing, {}))
+    if v.key in known and v.path:
+        hint = f"indent '{v.key}' if it belongs to what stands above it"
+    elif v.key in v.top["properties"] and len(v.path) > 1:
+        hint = f"begin '{v.key}' in the first column if it is the file's"
     if near := closest(v.key, v.inherited):
         hint = f"did you mean '{near[0]}' of {shown_path(v.inherited[near[0]].key.file)}?"
     yield Diagnostic(v.span, "missing-key", f"{v.name} has no key '{missing}'", hint)
@@ -338,8 +344,6 @@ def _choices(v: Violation) -> Iterator[Diagnostic]:
     message = f"{_shown(v.instance)} is not a value of {v.name}, expected {', '.join(choices)}"
     near = [choice for choice in closest(str(v.instance), choices) if resolve(choice) == choice]
     hint, fix = did_you_mean(str(v.instance), near), only_fix(str(v.instance), near)
-    if not near:
-        hint, fix = repaired(str(v.instance), choices.__contains__)
     if v.text in choices:
         hint, fix = _in_quotes(v), None
     yield Diagnostic(v.span, "wrong-value", message, hint, fix=fix)

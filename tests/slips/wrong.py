@@ -81,7 +81,6 @@ SLIPS: dict[str, tuple[dict[int, str | None], str]] = {
     "colon-no-blank-brace": ({13: "    with:{freq: 100 Hz}", 14: None}, "13:5 unknown-key"),
     "colon-no-blank-flow": ({15: "  pose: {uses:integrator, with: {freq: 100 Hz}}"}, "15:10 unknown-key"),
     "colon-no-blank": ({4: "level:sil"}, "4:6 yaml-syntax"),
-    "comment-no-blank": ({4: "level: sil#simulated"}, "4:8 wrong-value"),
     "crlf-tab": ({18: "\tuses: collision"}, "18:1 yaml-tab"),
     "dash-for-key": ({4: "- level: sil"}, "4:1 yaml-syntax"),
     "document-second": ({7: "clock: lockstep\n---"}, "8:1 yaml-syntax"),
@@ -89,10 +88,6 @@ SLIPS: dict[str, tuple[dict[int, str | None], str]] = {
     "indent-first-key": ({2: " name: indent-first-key"}, "2:2 yaml-syntax"),
     "indent-key-deeper": ({4: "  level: sil"}, "4:3 yaml-syntax"),
     "indent-key-shallower": ({13: "   with:"}, "13:4 yaml-syntax"),
-    "indent-missing-body": (
-        {9: "camera: {uses: virtual-camera, with: {map-path: maps/plain, freq: 10 Hz}}"},
-        "9:1 unknown-key",
-    ),
     "indent-one-too-few": ({21: "     walls: [left, right]"}, "21:6 yaml-syntax"),
     "indent-one-too-many": ({21: "       walls: [left, right]"}, "21:8 yaml-syntax"),
     "key-beside-with": ({15: "  pose: {uses: integrator, freq: 100 Hz}"}, "15:28 unknown-key"),
