@@ -65,7 +65,10 @@ class Part:
 
     def literal(self, node: Node) -> str | None:
         """A text that is known when the test is compiled; None for any other, with a problem."""
-        if not isinstance(node, Scalar) or node.value is None:
+        if not isinstance(node, Scalar):
+            self.add(Diagnostic(node.span, "wrong-type", f"a list or a mapping in '{self.name}', expected a text"))
+            return None
+        if node.value is None:
             return None
         found = literal(text(plain(node)))
         if found is None and "?" not in node.text:

@@ -33,18 +33,12 @@ environment: ["A=${B:-$}"]
 
 WRONG = """
 stop_grace_period: 10
-stop_grace_period: 1m 30s
 volumes: [known:/data, "data:/more:ro"]
 cap_drop: true
 cpus: "0x10"
 cpus: [1]
-tmpfs: 3
 user: {a: b}
-healthcheck: {test: a, interval: soon}
-healthcheck: {test: a, retries: many}
-healthcheck: {disable: perhaps}
 init: 1
-privileged: perhaps
 mem_limit: lots
 mem_limit: 0,5g
 environment: ["A=${B:-${C}"]
