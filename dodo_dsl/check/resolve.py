@@ -93,13 +93,6 @@ def _former_ids() -> frozenset[tuple[str, int]]:
     return frozenset((one.name, one.id) for one in odvd.load(STANDARD_0_9))
 
 
-def without_pictures(service: ResolvedService) -> Path | None:
-    """The recording that a service plays, if that has no frames; None if it may have some."""
-    path = _recording(service)
-    image = known_ids(())[IMAGE]
-    return None if path is None or holds(path, image, _NO_STAMP) else path
-
-
 def _recording(service: ResolvedService) -> Path | None:
     found = [a.value.path for a in service.arguments.values() if a.parameter.format == FORMAT and a.value]
     return found[0] if len(found) == 1 else None

@@ -39,8 +39,7 @@ _OWN = {CLOCK: "is always there", **dict.fromkeys(("/tf", STATIC_FRAMES), "has t
 class Resolved:
     """A topic of a service of the application, with what it is made of or becomes, ``bus``; empty without any.
 
-    ``maker`` is the service that makes it, or the camera whose pixels it counts. ``wanted`` are messages of which it
-    could be made.
+    ``maker`` is the service that makes it, or the camera whose pixels it counts.
     """
 
     service: str
@@ -48,7 +47,6 @@ class Resolved:
     bus: tuple[str, ...] = ()
     maker: ResolvedService | None = None
     problem: Diagnostic | None = None
-    wanted: tuple[str, ...] = ()
 
     @property
     def is_picture(self) -> bool:
@@ -144,7 +142,6 @@ class Sources:
         if any(port.partition("/")[0] == "*" for port, _ in self.messages):  # of a recording
             asked = {word.partition("/")[0]: word for word, _ in it.written.ports}
             return replace(it, bus=tuple(asked.get(name, f"{name}/0") for name in ways[0]))
-        it = replace(it, wanted=tuple(name for names in ways for name in names))
         return _without_source(it, " or ".join(" with ".join(names) for names in ways), self.messages)
 
 
@@ -180,29 +177,21 @@ def _format(memory: str, camera: ResolvedService | None) -> str:
 
 def problems(topics: Iterable[Resolved]) -> Iterator[Diagnostic]:
     """What is wrong with topics, each and together."""
-    types: dict[str, Resolved] = {}
-    sent: dict[str, Resolved] = {}
+    first: dict[str, Resolved] = {}
+    sent: dict[str, str] = {}
     for each in topics:
-        if each.problem:
-            yield each.problem
-        topic, other = each.written.topic, types.setdefault(each.written.topic.topic, each)
-        found: Resolved | None = None
-        if other.written.topic.type != topic.type:
-            why = f"has two types: '{other.service}' has {other.written.topic.type}"
-            found = replace(each, written=replace(each.written, span=each.written.type_span)).refused("ros-topic", why)
-        elif other.written.given != each.written.given:
-            found = each.refused("ros-topic", "is both in 'in' and in 'out'", "give one of them another topic")
-        elif (other.written.topic, *other.bus) != (topic, *each.bus) and not (other.problem or each.problem):
-            found = each.refused("ros-topic", f"has other keys than at '{other.service}'", "write the same at both")
-        elif other is not each and not each.written.given and not other.written.given:
-            why, hint = f"is published by '{other.service}' and '{each.service}'", "give one of them another topic"
-            found = each.refused("ros-topic", why, hint, "warning")
-        for name in () if each.written.given else each.bus:
-            if (before := sent.setdefault(name.removesuffix("/0"), each)).written.topic.topic != topic.topic:
+        given, topic = each.written.given, each.written.topic
+        other = first.setdefault(topic.topic, each)
+        found = [each]
+        is_same = (given, topic) == (other.written.given, other.written.topic)
+        if not is_same or (each.bus != other.bus and not (each.problem or other.problem)):
+            why = f"is another one at '{other.service}'"
+            found.append(each.refused("ros-topic", why, "write the same type and keys, in one of 'in' and 'out'"))
+        for name in () if given else each.bus:
+            if (before := sent.setdefault(name.removesuffix("/0"), topic.topic)) != topic.topic:
                 hint = "remove one, or give it another message with 'to'"
-                found = each.refused("ros-topic", f"and '{before.written.topic.topic}' both become {name}", hint)
-        if found and found.problem:
-            yield found.problem
+                found.append(each.refused("ros-topic", f"and '{before}' both become {name}", hint))
+        yield from (one.problem for one in found if one.problem)
 
 
 def graph(resolved: Sequence[Resolved]) -> RosGraph:

@@ -10,10 +10,10 @@ from dodo_dsl.application.model import ApplicationSource, ComposeService, image_
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.application.variables import owner, split_by, with_variables
 from dodo_dsl.check import ros_topics
-from dodo_dsl.check.resolve import IMAGE, RuleContext, without_pictures
+from dodo_dsl.check.resolve import RuleContext
 from dodo_dsl.check.senders import HIDDEN, told
 from dodo_dsl.check.wiring import ANYTHING, End, Wiring, message
-from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
+from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean
 from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.opendlv.ros_types import SENT
 from dodo_dsl.source import Scalar
@@ -51,11 +51,7 @@ def check_topics(context: RuleContext) -> Iterator[Diagnostic]:
             if is_of_the_world(name) or context.wiring.judges_by(message(name, 0)):
                 what = f"'{each.written.topic.topic}' is made of {name}, which only a simulation has"
                 yield Diagnostic(each.written.span, "ros-topic", what, "it is in no topic: remove it")
-    for problem in ros_topics.problems(context.wiring.topics):
-        wanted = {name for each in context.wiring.topics if each.problem == problem for name in each.wanted}
-        makers = (m.name for name in wanted for m in context.manifests.values() if _sends(m, name))
-        names = ", ".join(sorted(set(makers)))
-        yield replace(problem, hint=f"add a service that makes it: {names}") if names and not problem.hint else problem
+    yield from ros_topics.problems(context.wiring.topics)
 
 
 def check_hidden_messages(context: RuleContext) -> Iterator[Diagnostic]:
@@ -152,27 +148,16 @@ Asked = dict[str, Span]
 
 def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
     """A service that reads one memory of the test may make others, and so may services that share one."""
-    ends = [end for end in context.wiring.produced if end.port.kind == "memory"]
-    made = {end.port.name for end in ends}
+    made = {end.port.name for end in context.wiring.produced if end.port.kind == "memory"}
     if not made or context.application is None or not context.test.is_complete:
         return
     services = with_variables(context.application, context.test.variables).services.values()
     asked = {service.name: _asked(service) for service in services}
-    players = {each.use.name: path for each in context.services if (path := without_pictures(each))}
-    shown = {end.port.name for end in ends if end.service not in players}
-    blank = {end.port.name: players[end.service] for end in ends if end.port.name not in shown}
     for asking, names in asked.items():
         others = {name for other, own in asked.items() if other != asking for name in own}
-        is_strange = made.isdisjoint(names) and others.isdisjoint(names)
-        for name, span in names.items():
-            near = closest(name, made)
+        for name, span in names.items() if made.isdisjoint(names) and others.isdisjoint(names) else ():
             message = f"the application's '{asking}' asks for the memory '{name}', which no service of the test makes"
-            hint = f"did you mean '{near[0]}'?" if near else f"the test makes {', '.join(sorted(made))}"
-            if name in blank:
-                message = f"the application's '{asking}' reads frames from '{name}', and '{blank[name].name}' has none"
-                hint = f"take a recording with {IMAGE}; 'dodo rec info' shows what it holds"
-            if is_strange or name in blank:
-                yield Diagnostic(span, "application-memory", message, hint, "warning")
+            yield Diagnostic(span, "application-memory", message, did_you_mean(name, made), "warning")
 
 
 def readers(application: ApplicationSource, names: Collection[str]) -> list[str]:

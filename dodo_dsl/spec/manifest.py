@@ -24,72 +24,52 @@ RESERVED = ("cid", "help")
 _PLACEHOLDER = re.compile(r"\{(?P<name>[^{}]*)\}")
 FRAMES = re.compile(r"(?P<map>[a-z0-9-]+)\.frames")
 """A placeholder for the frames at which a map has models, as in ``{map-path.frames}``."""
-_OF_TYPES = {
-    "of": ("list",),
-    "choices": ("string", "list"),
-    "unit": ("number",),
-    **dict.fromkeys(("minimum", "maximum"), ("number", "integer", "amount")),
-}
-"""Keys that only parameters of some types may have, or lists of items of these types."""
 
 
 def inconsistencies(node: Mapping) -> Iterator[Diagnostic]:
-    """Problems of ports, defaults, bounds and references in a manifest that its schema accepts."""
+    """Problems of references and defaults in a manifest that its schema accepts."""
     parameters = entries(node, "parameters")
-    types = {name: str(plain(entry.value)["type"]) for name, entry in parameters.items()}
     cases = part(node, "messages", "cases")
     above = [*(entry.value for entry in parameters.values()), *(cases.items if isinstance(cases, Sequence) else ())]
     named = [(each.span, "one-of", each.text) for each in _scalars(node.get("one-of"))]
     named += [(entry.key, "when", name) for each in above for name, entry in entries(each, "when").items()]
+    for entry in parameters.values():
+        words = ((key, part(entry.value, key)) for key in ("among", "per"))
+        named += [(w.span, key, w.text.partition(".")[0]) for key, w in words if isinstance(w, Scalar)]
     for port in (each for key in ("messages", "memory", "devices") for each in _scalars(node.get(key))):
         for match in _PLACEHOLDER.finditer(port.text):
-            frames = None if match["name"] in types else FRAMES.fullmatch(match["name"])
+            frames = None if match["name"] in parameters else FRAMES.fullmatch(match["name"])
             named.append((port.span, port.text, frames["map"] if frames else match["name"]))
     for span, what, name in named:
-        if name not in types:
+        if name not in parameters:
             message = f"'{what}' names the unknown parameter '{name}'"
-            yield Diagnostic(span, RULE, message, did_you_mean(name, types))
+            yield Diagnostic(span, RULE, message, did_you_mean(name, parameters))
     for name, entry in parameters.items():
         if name in RESERVED:
             message = f"'--{name}' is a flag of every service, so it cannot name a parameter"
             yield Diagnostic(entry.key, RULE, message, "choose another name")
-        if isinstance(entry.value, Mapping):
-            yield from _parameter(name, entry.value, types)
+        keys, raw = entries(entry.value), plain(entry.value)
+        for key in keys.keys() & {"within-timeout", "setup-times"}:
+            if raw[key] and (raw["type"], raw.get("unit")) != ("number", "s"):
+                yield Diagnostic(keys[key].key, RULE, f"'{name}' is not a duration", "write 'type: number, unit: s'")
+        if "default" in keys and (message := _problem_of_default(name, raw, keys["default"].value)):
+            yield Diagnostic(keys["default"].key, RULE, message)
 
 
 def _scalars(node: Node | None) -> list[Scalar]:
     return [each for each in walk(node) if isinstance(each, Scalar)] if node is not None else []
 
 
-def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diagnostic]:
-    raw = plain(node)
-    kind = raw["type"]
+def _problem_of_default(name: str, raw: dict[str, Any], node: Node) -> str:
+    from dodo_dsl.spec.arguments import ValueProblem, convert
 
-    def wrong(key: str, message: str, hint: str = "") -> Diagnostic:
-        return Diagnostic(node.entries[key].key, RULE, message, hint)
-
-    for key, kinds in _OF_TYPES.items():
-        if raw.get(key) not in (None, False) and kind not in kinds and raw.get("of") not in kinds:
-            yield wrong(key, f"'{key}' is for parameters of type {' or '.join(kinds)}, but '{name}' is of type {kind}")
-    for key in ("within-timeout", "setup-times"):
-        if raw.get(key) and raw.get("unit") != "s":
-            yield wrong(key, f"'{name}' is not a duration", "add 'unit: s'")
-    if raw.get("minimum", 0) > raw.get("maximum", raw.get("minimum", 0)):
-        yield wrong("minimum", f"the minimum of '{name}' is larger than its maximum")
-    source = str(raw.get("among", "")).partition(".")[0]
-    for key, other, wanted in (("among", source, "path"), ("per", raw.get("per"), "list")):
-        if other and types.get(other) != wanted:
-            message = f"'{key}' names '{other}', expected a parameter of type {wanted}"
-            yield wrong(key, message, did_you_mean(other, [n for n, t in types.items() if t == wanted]))
-    if kind == "path" and "default" in raw:
-        yield wrong("default", f"'{name}' is a path in a test, so it cannot have a default")
-    elif "default" in raw:
-        from dodo_dsl.spec.arguments import ValueProblem, convert
-
-        try:
-            convert(replace(_read(name, raw), unit=""), node.entries["default"].value, Path())
-        except ValueProblem as problem:
-            yield wrong("default", f"the default does not fit: {problem}")
+    if raw["type"] == "path":
+        return f"'{name}' is a path in a test, so it cannot have a default"
+    try:
+        convert(replace(_read(name, raw), unit=""), node, Path())
+    except ValueProblem as problem:
+        return f"the default does not fit: {problem}"
+    return ""
 
 
 Value = str | int | float | bool | list[str | int | float] | None

@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Collection
-from collections.abc import Mapping as Map
 from typing import Any
 
 import yaml
@@ -65,7 +64,7 @@ def schema_at(schema: dict[str, Any], key: str) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-def home(key: str, beside: Map[str, Entry], schema: dict[str, Any]) -> str:
+def home(key: str, beside: dict[str, Entry], schema: dict[str, Any]) -> str:
     """Where a key of a mapping with this ``schema`` belongs that may be indented too little; empty for others."""
     here = beside[key]
     above = next((name for name, each in reversed(beside.items()) if each.key.line < here.key.line), "")

@@ -4,11 +4,11 @@ A plain run takes the nominal values; ``dodo search`` looks for conditions withi
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from decimal import Decimal
 
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
-from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, entries, part
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.matrix import Placeholders
 
@@ -63,47 +63,29 @@ def read(node: Node) -> tuple[tuple[Range, ...], list[Diagnostic]]:
 
     One without a nominal value is left out, one with problems has no ends; the schema reports what is not of its type.
     """
-    written = node.get(KEY) if isinstance(node, Mapping) else None
     ranges: list[Range] = []
     found: list[Diagnostic] = []
-    for name, entry in written.entries.items() if isinstance(written, Mapping) else ():
-        if not isinstance(entry.value, Mapping):
-            continue
-        missing = list(_missing(name, entry, entry.value))
-        found.extend(missing)
-        middle = entry.value.get("nominal")
+    for name, entry in entries(node, KEY).items():
+        low, high, among, middle = (part(entry.value, key) for key in ("from", "to", "among", "nominal"))
+        one, problems = None, list[Diagnostic]()
+        if not isinstance(middle, Scalar) or (among is None and None in (low, high)) or (among and (low or high)):
+            problems = [_incomplete(name, entry)]
+        elif isinstance(among, Sequence):
+            ends = tuple(item for item in among.items if isinstance(item, Scalar))
+            one, problems = Range(name, middle, ends, is_list=True), list(_of_list(middle, ends))
+        elif isinstance(low, Scalar) and isinstance(high, Scalar):
+            unit = quantity.written_unit(low.text)
+            one, problems = Range(name, middle, (low, high), unit or ""), list(_of_numbers(middle, low, high, unit))
         if isinstance(middle, Scalar):
-            one, problems = (Range(name, middle, ()), []) if missing else _range(name, entry, entry.value, middle)
-            ranges.append(replace(one, ends=()) if problems else one)
-            found.extend(problems)
+            ranges.append(one if one and not problems else Range(name, middle, ()))
+        found += problems if isinstance(entry.value, Mapping) else ()
     return tuple(ranges), found
 
 
-def _missing(name: str, entry: Entry, node: Mapping) -> Iterator[Diagnostic]:
-    """The keys that a range needs; a test that extends another one may have them from there."""
-    needed = ("nominal",) if "among" in node.entries else ("from", "to", "nominal")
-    if missing := [f"'{key}'" for key in needed if key not in node.entries]:
-        hint = "write for example {from: 0.3, to: 2, nominal: 1} or {among: [plain, wood], nominal: plain}"
-        yield Diagnostic(entry.key, "missing-key", f"range '{name}' has no {' and no '.join(missing)}", hint)
-
-
-def _range(name: str, entry: Entry, node: Mapping, middle: Scalar) -> tuple[Range, list[Diagnostic]]:
-    low, high, among = (node.get(key) for key in ("from", "to", "among"))
-    none = Range(name, middle, ())
-    if among is not None and (low is not None or high is not None):
-        message = f"range '{name}' has 'among' beside 'from' or 'to', expected one of them"
-        return none, [Diagnostic(entry.key, "vary-range", message)]
-    if isinstance(among, Sequence):
-        ends = tuple(item for item in among.items if isinstance(item, Scalar))
-        return Range(name, middle, ends, is_list=True), list(_of_list(middle, ends))
-    if not isinstance(low, Scalar) or not isinstance(high, Scalar):
-        return none, []
-    unit = quantity.written_unit(low.text)
-    if unit is None:
-        message = f"'from' is '{low.text[:60]}', expected a number or a quantity"
-        hint = quantity.with_point(low.text) or "for other values write 'among: [plain, wood]'"
-        return none, [Diagnostic(low.span, "vary-range", message, hint)]
-    return Range(name, middle, (low, high), unit), list(_of_numbers(middle, low, high, unit))
+def _incomplete(name: str, entry: Entry) -> Diagnostic:
+    hint = "write for example {from: 0.3, to: 2, nominal: 1} or {among: [plain, wood], nominal: plain}"
+    message = f"range '{name}' has not 'nominal', and either 'from' and 'to' or 'among'"
+    return Diagnostic(entry.key, "missing-key", message, hint)
 
 
 def _of_list(middle: Scalar, ends: tuple[Scalar, ...]) -> Iterator[Diagnostic]:
@@ -116,16 +98,19 @@ def _of_list(middle: Scalar, ends: tuple[Scalar, ...]) -> Iterator[Diagnostic]:
         yield Diagnostic(middle.span, "vary-range", message, did_you_mean(middle.text, texts))
 
 
-def _of_numbers(middle: Scalar, low: Scalar, high: Scalar, unit: str) -> Iterator[Diagnostic]:
-    numbers = {}
-    for key, scalar in (("from", low), ("to", high), ("nominal", middle)):
+def _of_numbers(middle: Scalar, low: Scalar, high: Scalar, unit: str | None) -> Iterator[Diagnostic]:
+    if unit is None:
+        message = f"'from' is '{low.text[:60]}', expected a number or a quantity"
+        hint = quantity.with_point(low.text) or "for other values write 'among: [plain, wood]'"
+        yield Diagnostic(low.span, "vary-range", message, hint)
+        return
+    numbers = []
+    for key, scalar in (("from", low), ("nominal", middle), ("to", high)):
         try:
-            numbers[key] = _number(scalar.text, unit)
+            numbers.append(_number(scalar.text, unit))
         except quantity.QuantityError as error:
             yield Diagnostic(scalar.span, "wrong-unit", f"'{key}': {error}", error.hint)
-    if len(numbers) < 3:
-        return
-    if numbers["from"] >= numbers["to"]:
+    if len(numbers) == 3 and numbers[0] >= numbers[2]:
         yield Diagnostic(low.span, "vary-range", f"'from' is {low.text}, expected less than 'to', {high.text}")
-    elif not numbers["from"] <= numbers["nominal"] <= numbers["to"]:
+    elif len(numbers) == 3 and not numbers[0] <= numbers[1] <= numbers[2]:
         yield Diagnostic(middle.span, "vary-range", f"'nominal' is {middle.text}, expected {low.text} to {high.text}")
