@@ -17,7 +17,7 @@ from dodo_dsl.check.resolve import ResolvedTest, known_ids, resolve
 from dodo_dsl.check.service_rules import unknown_messages
 from dodo_dsl.check.spec_rules import check_suite
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
-from dodo_dsl.source import Reader, Scalar, read
+from dodo_dsl.source import Scalar, read
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.load import Settings, applied, load_spec, on_each, varied
 from dodo_dsl.spec.manifest import Manifest, load_manifests
@@ -157,28 +157,27 @@ def load(
     application: Sequence[Path] = (),
     settings: Settings = Settings(),  # noqa: B008  (it is frozen)
     start: Path | None = None,
-    reader: Reader = read,
     services_only: bool = False,
     names: Collection[str] = (),
 ) -> Checked:
     """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any.
 
     ``application`` are compose files that replace the deployment's, which is looked for at ``start``, then above the
-    tests. ``reader`` may know texts that are not saved yet. With ``services_only`` no test is read, and where
+    tests. With ``services_only`` no test is read, and where
     all ``names`` are those of files, no other is.
     """
-    deployment, found = load_deployment(find_deployment(start or Path.cwd(), paths), reader)
-    manifests, manifest_problems = load_manifests(deployment.services, reader)
-    own = unknown_messages(deployment.services, reader, known_ids(deployment.messages))
-    locations, empty = locate(paths, deployment.registry, _registries_above(paths, reader))
+    deployment, found = load_deployment(find_deployment(start or Path.cwd(), paths))
+    manifests, manifest_problems = load_manifests(deployment.services)
+    own = unknown_messages(deployment.services, known_ids(deployment.messages))
+    locations, empty = locate(paths, deployment.registry, _registries_above(paths))
     is_each_one = {location.stem for location in locations}.issuperset(names)
     wanted = [location for location in locations if location.stem in names] if names and is_each_one else locations
-    once = functools.lru_cache(maxsize=_MOST_READ)(reader)
+    once = functools.lru_cache(maxsize=_MOST_READ)(read)
     loaded = {} if services_only else {location.path: load_spec(location, once) for location in wanted}
     source = None
     if files := application or deployment.application:
         source, of_application = read_application(
-            files, access(deployment), deployment.sandbox, reader, deployment.declarations
+            files, access(deployment), deployment.sandbox, deployment.declarations
         )
         found = [*found, *of_application]
         if source:
@@ -264,10 +263,10 @@ def without_unsatisfied(checked: Checked, named: Collection[Path] = ()) -> Check
     )
 
 
-def _registries_above(paths: Sequence[Path], reader: Reader) -> list[Path]:
+def _registries_above(paths: Sequence[Path]) -> list[Path]:
     """The registries of the deployments that hold the paths, wherever DoDo was started."""
     files = {find_deployment(path if path.is_dir() else path.parent) for path in paths}
-    return [folder for file in files if file for folder in load_deployment(file, reader)[0].registry]
+    return [folder for file in files if file for folder in load_deployment(file)[0].registry]
 
 
 def plan(checked: Checked, out: Path, options: "JobOptions | None" = None) -> Compilation:

@@ -11,7 +11,7 @@ from dodo_dsl.application.interpolation import dotenv, escaped, filled, literal,
 from dodo_dsl.application.merge import Place, changed, normal, rebased, relocated
 from dodo_dsl.application.secret_variables import holds_secret, is_steering
 from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.source import Node, Reader, Scalar
+from dodo_dsl.source import Node, Scalar
 
 TEST_FILLED = ("command", "entrypoint", "environment", "healthcheck")
 """The keys of a service whose variables a test may set, so that they are filled in for each test."""
@@ -43,9 +43,8 @@ class ComposeFiles:
     files; ``passed`` are of DoDo's own environment. ``written`` are the texts with variables by their places.
     """
 
-    def __init__(self, folder: Path, reader: Reader, roots: tuple[Path, ...], passed: Collection[str] = ()) -> None:
+    def __init__(self, folder: Path, roots: tuple[Path, ...], passed: Collection[str] = ()) -> None:
         self.folder = folder
-        self._reader = reader
         self._roots = roots
         self.passed = passed
         self.problems: list[Diagnostic] = []
@@ -102,7 +101,7 @@ class ComposeFiles:
     def read(self, file: Path) -> source.Mapping | None:
         """A file as it is written."""
         if file not in self._read:
-            node, found = self._reader(file)
+            node, found = source.read(file)
             if node is None and not found:
                 found = [Diagnostic(Span(str(file)), "application-file", "the file is empty, expected a compose file")]
             if node is not None and not isinstance(node, source.Mapping):

@@ -35,7 +35,7 @@ from dodo_dsl.application.model import (
 from dodo_dsl.application.ros_topics import BRIDGE, bridge
 from dodo_dsl.application.variables import tunable_problems, with_values
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, only_fix
-from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, entries
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, entries
 from dodo_dsl.spec.deployment import Declarations
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.validation import validate
@@ -52,7 +52,6 @@ def read_application(
     path: Path | Sequence[Path],
     access: Access = Access(),  # noqa: B008  (it is frozen)
     limits: SandboxLimits = SandboxLimits(),  # noqa: B008
-    reader: Reader = source.read,
     declarations: Declarations = Declarations(),  # noqa: B008
 ) -> tuple[ApplicationSource | None, list[Diagnostic]]:
     """An application from one compose file, or from several that are merged in order, and its problems.
@@ -63,7 +62,7 @@ def read_application(
     """
     paths = [path] if isinstance(path, Path) else list(path)
     folder = paths[0].resolve().parent
-    files = ComposeFiles(paths[0].parent, reader, (*repository(folder), *map(Path, access.roots)), access.passed)
+    files = ComposeFiles(paths[0].parent, (*repository(folder), *map(Path, access.roots)), access.passed)
     found = files.problems
     found.extend(_links(paths))
     document = None if found else load(files, paths)

@@ -1,4 +1,4 @@
-"""The rule catalogue: for each rule a summary, its reason, an example that violates it, and what to write instead.
+"""The rule catalogue: for each rule a summary, its reason, and an example that violates it.
 
 docs/reference/rules.md (``scripts/make-rules``) and ``dodo explain RULE`` are generated from ``catalogue.yml``.
 """
@@ -22,7 +22,7 @@ The rules that `dodo compile` checks, by the name that it prints in square brack
 in a terminal.
 
 Each example has only the keys that differ from a valid test `example.dodo.yml`. A line such as `# dodo.yml` begins
-another file. The example of a rule violates it; with what is written instead it does not.
+another file.
 
 `scripts/make-rules` generates this page from `dodo_dsl/check/catalogue.yml`.
 """
@@ -30,32 +30,14 @@ another file. The example of a rule violates it; with what is written instead it
 
 @dataclass(frozen=True)
 class Page:
-    """One rule; ``encoding`` is that of the bad example's files.
-
-    ``instead`` are lines in place of the bad example's with the same keys, empty if the reason says what to do.
-    """
+    """One rule; ``encoding`` is that of the bad example's files."""
 
     name: str
     group: str
     summary: str
     why: str
     bad: str
-    instead: str = ""
     encoding: str = "utf-8"
-
-    @property
-    def good(self) -> str:
-        """The example with the lines of ``instead``."""
-        lines, other = self.bad.splitlines(), self.instead.splitlines()
-        if len(lines) == 1:
-            return self.instead
-        new = {line.partition(":")[0].strip(): line for line in other}
-        return "\n".join(_in_place(new.get(line.partition(":")[0].strip(), line), line) for line in lines)
-
-
-def _in_place(new: str, old: str) -> str:
-    """A line with the indentation of the one whose place it takes, if it has none."""
-    return new if new[:1] == " " else f"{old[: len(old) - len(old.lstrip())]}{new.lstrip()}"
 
 
 @functools.cache
@@ -81,7 +63,6 @@ def text(page: Page) -> str:
     """A rule's page for a terminal."""
     parts = [f"{page.name}: {page.summary}", textwrap.fill(page.why, 100)]
     parts += ["This violates the rule:", textwrap.indent(page.bad, "    ")]
-    parts += ["Instead:", textwrap.indent(page.instead, "    ")] if page.instead else []
     return "\n\n".join(parts) + "\n"
 
 
@@ -96,8 +77,6 @@ def _sections() -> Iterator[str]:
         for page in members:
             yield f"\n### {page.name}\n\n{page.summary}\n{page.why}\n"
             yield f"```yaml\n{page.bad}\n```"
-            if page.instead:
-                yield f"\nInstead:\n\n```yaml\n{page.instead}\n```"
     yield ""
 
 

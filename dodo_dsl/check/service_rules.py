@@ -11,7 +11,7 @@ from dodo_dsl.check.resolve import RuleContext
 from dodo_dsl.check.senders import is_shipped, told
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.opendlv.address import is_of_the_world
-from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Reader, Scalar, Sequence, walk
+from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Scalar, Sequence, read, walk
 from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService
 from dodo_dsl.spec.manifest import MANIFEST, holds
 from dodo_dsl.spec.slips import meant, unknown_key
@@ -215,14 +215,14 @@ def unknown_message(name: str, known: Collection[str], span: Span) -> Iterator[D
 _MESSAGE = re.compile(r"[\w.]+")
 
 
-def unknown_messages(folders: tuple[Path, ...], reader: Reader, known: Collection[str]) -> Iterator[Diagnostic]:
+def unknown_messages(folders: tuple[Path, ...], known: Collection[str]) -> Iterator[Diagnostic]:
     """The messages that are not ``known`` in ``<folder>/<service>/service.yml``; a placeholder is for the test to name.
 
     Loading these files reports whatever else is wrong with them.
     """
     for folder in folders:
         for path in sorted(folder.glob("*/service.yml")):
-            node, _ = reader(path)
+            node, _ = read(path)
             ports = node.get("messages") if isinstance(node, Mapping) else None
             for scalar in walk(ports) if ports is not None else ():
                 name = scalar.text.partition("/")[0].removesuffix("?") if isinstance(scalar, Scalar) else ""

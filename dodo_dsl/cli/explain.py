@@ -70,7 +70,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 
 
 def _page(page: catalogue.Page) -> dict[str, str]:
-    return {**asdict(page), "good": page.good}
+    return asdict(page)
 
 
 def explain(test: ResolvedTest, application: ApplicationSource | None = None) -> Explanation:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
-from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, entries, part, path_of, plain, read
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, entries, part, path_of, plain, read
 from dodo_dsl.spec import rig
 from dodo_dsl.spec.manifest import MANIFEST
 from dodo_dsl.spec.registry import refuse_yaml
@@ -114,11 +114,11 @@ def find_deployment(start: Path, paths: Iterable[Path] = ()) -> Path | None:
     return above.pop() if len(above) == 1 else None
 
 
-def load_deployment(path: Path | None, reader: Reader = read) -> tuple[Deployment, list[Diagnostic]]:
+def load_deployment(path: Path | None) -> tuple[Deployment, list[Diagnostic]]:
     """The deployment of a ``dodo.yml``; without one, the shipped registry and no application."""
     if path is None:
         return Deployment(Path.cwd(), registry=(package_data.registry(),)), []
-    node, found = reader(path)
+    node, found = read(path)
     if node is None and not found:
         found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected at least 'dodo: 1'")]
     if node is not None:

@@ -69,7 +69,7 @@ def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
             found += [d for d in problems if is_whole or not _is_missing(d, node)]
             wrong += bool(problems)
         template = without_places(template, places)
-        spec = Spec(location, choice=choice, spans=spans, is_whole=is_whole and not _hides_services(node, places))
+        spec = Spec(location, choice=choice, spans=spans, is_whole=is_whole and not _hides_services(places))
         spec = _at(replace(spec, ranges=ranges, template=template), {})
         corners, problems = _corners(spec)
         found += problems
@@ -77,11 +77,10 @@ def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
     return specs, found
 
 
-def _hides_services(node: Mapping, places: Collection[ValuePath]) -> bool:
+def _hides_services(places: Collection[ValuePath]) -> bool:
     """Whether services may be in what is not valid: in a layer, or in an unknown key, most likely a misspelt layer."""
     known = schema_of_keys("dodo")["properties"]
-    of_layers = any(place[0] in LAYERS and place[2:] in ((), ("uses",), ("with",)) for place in places)
-    return of_layers or any(p[0] not in known and isinstance(node.get(str(p[0])), Mapping) for p in places)
+    return any(place[0] in LAYERS or place[0] not in known for place in places)
 
 
 def _by_name(location: Location, node: Node) -> Spec:
@@ -92,10 +91,10 @@ def _by_name(location: Location, node: Node) -> Spec:
     return Spec(location, name=name.value, spans={"name": name.span}, is_whole=False)
 
 
-def _surely_wrong(node: Node) -> Iterator[Diagnostic]:
+def _surely_wrong(node: Mapping) -> Iterator[Diagnostic]:
     """The problems that a test has whatever the one holds that it extends."""
-    entry = node.entries.get(EXTENDS) if isinstance(node, Mapping) else None
-    places = (entry.key, entry.value.span) if entry else ()
+    entry = node.entries[EXTENDS]
+    places = (entry.key, entry.value.span)
     return (d for d in validate(node, "dodo") if d.rule in ("unknown-key", "yaml-tag") or d.span in places)
 
 

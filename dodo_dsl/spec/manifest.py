@@ -13,7 +13,7 @@ from typing import Any
 
 from dodo_dsl import package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, shown_path
-from dodo_dsl.source import Mapping, Node, Reader, Scalar, Sequence, entries, part, plain, read, walk
+from dodo_dsl.source import Mapping, Node, Scalar, Sequence, entries, part, plain, read, walk
 from dodo_dsl.spec.quantity import SHARE
 from dodo_dsl.spec.validation import validate
 
@@ -218,9 +218,9 @@ def _ports(raw: dict[str, Any]) -> Ports:
     return Ports(tuple(raw.get("in", ())), tuple(raw.get("out", ())))
 
 
-def load_manifest(path: Path, reader: Reader = read) -> tuple[Manifest | None, list[Diagnostic]]:
+def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
     """The manifest of a ``service.yml`` and its problems."""
-    node, found = reader(path)
+    node, found = read(path)
     if node is None and not found:
         found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected a service's manifest")]
     if node is not None:
@@ -271,12 +271,12 @@ def _shipped(file: Path) -> Manifest:
 
 
 @functools.cache
-def load_manifests(folders: tuple[Path, ...] = (), reader: Reader = read) -> tuple[Manifests, tuple[Diagnostic, ...]]:
+def load_manifests(folders: tuple[Path, ...] = ()) -> tuple[Manifests, tuple[Diagnostic, ...]]:
     """Every manifest ``<folder>/<service>/service.yml``, shipped ones and those of ``folders``, and their problems."""
     own: dict[str, Manifest] = {}
     known, found = Manifests(own), list[Diagnostic]()
     for path in (path for folder in folders for path in sorted(folder.glob(f"*/{MANIFEST}"))):
-        manifest, problems = load_manifest(path, reader)
+        manifest, problems = load_manifest(path)
         found.extend(problems)
         if manifest and manifest.name in known:
             is_own = manifest.name in own

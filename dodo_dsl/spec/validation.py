@@ -9,7 +9,6 @@ import itertools
 import json
 import math
 import operator
-import re
 import sys
 from collections.abc import Callable, Collection, Iterator
 from typing import Any
@@ -304,17 +303,13 @@ def _type(v: Violation) -> Iterator[Diagnostic]:
     found = _shown(v.text) if v.text else "empty"
     if isinstance(value, dict | list):
         found = _TYPE_NAMES["object" if isinstance(value, dict) else "array"]
-    span, hint, fix = v.span, schema.get("x-hint") or _in_quotes(v), None
-    items = [value] if isinstance(value, str) else list(value) if isinstance(value, dict) else []
+    span, hint, fix = v.span, _in_quotes(v), None
     if isinstance(v.node, Sequence) and wanted == "object":
-        span, hint = v.node.span, hint or "write 'key: value' in place of list items"
-    elif not hint and wanted == "array" and v.key:
-        shown = items if items and _fits(schema, items) else schema.get("examples", [None])[0]
-        hint = f"write {v.key}: {in_line(shown)}" if shown else ""
-    elif not hint and wanted == "boolean" and isinstance(value, str):
+        span, hint = v.node.span, "write 'key: value' in place of list items"
+    elif wanted == "array" and isinstance(value, str) and _fits(schema, [value]):
+        hint = f"write {v.key}: {in_line([value])}"
+    elif wanted == "boolean" and isinstance(value, str):
         hint, fix = boolean_meant(value)
-    elif not hint and wanted in ("integer", "number") and isinstance(value, str) and re.fullmatch(r"-?\d{1,20}", value):
-        hint = f"write {value}, without quotation marks"
     yield Diagnostic(span, "wrong-type", f"{v.name} is {found}, expected {' or '.join(names)}", hint, fix=fix)
 
 
@@ -360,10 +355,7 @@ def _pattern(v: Violation) -> Iterator[Diagnostic]:
     value = str(v.instance)
     expected = v.schema.get(EXPECT, f"a string that matches {v.schema.get('pattern')}")
     span = v.span if v.of_key is None else v.entries[v.of_key].key
-    name = re.sub(r"[^a-z0-9]+", "-", value[:100].lower()).strip("-")[:40]
-    is_text = name != value and resolve(name) == name != "" and _fits(v.schema, name)
-    hint = f"for example '{name}'" if is_text else ""
-    yield Diagnostic(span, "wrong-value", f"{_shown(value)} is not allowed here, expected {expected}", hint)
+    yield Diagnostic(span, "wrong-value", f"{_shown(value)} is not allowed here, expected {expected}")
 
 
 def _bounds(v: Violation) -> Iterator[Diagnostic]:

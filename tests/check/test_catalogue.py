@@ -21,13 +21,6 @@ def test_the_bad_example_gives_its_rule(rule: str, tmp_path: Path) -> None:
     assert rule in {problem.rule for problem in examples.problems(tmp_path)}
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("rule", [rule for rule in EXAMPLES if catalogue.pages()[str(rule.values[0])].instead])
-def test_the_good_example_is_silent(rule: str, tmp_path: Path) -> None:
-    examples.write(catalogue.pages()[rule].good, tmp_path)
-    assert examples.problems(tmp_path) == []
-
-
 def test_the_page_is_up_to_date(update_goldens: bool) -> None:
     if update_goldens:
         catalogue.write(PAGE)

@@ -82,7 +82,7 @@ def test_a_rule() -> None:
     code, out, err = explained("wrong-unit")
     assert (code, err) == (0, "")
     assert out == catalogue.text(catalogue.pages()["wrong-unit"])
-    assert json.loads(explained("wrong-unit", "--json")[1])["good"] == "timeout: 60 s"
+    assert json.loads(explained("wrong-unit", "--json")[1])["bad"] == "timeout: 60"
 
 
 def test_all_rules_have_a_line() -> None:
