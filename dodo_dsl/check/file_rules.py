@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from dodo_dsl.check.resolve import RuleContext, known_ids
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.assets import formats, map_file
 from dodo_dsl.opendlv.assets.problem import InputError
@@ -180,9 +180,11 @@ def _within(context: RuleContext, service: ResolvedService, seconds: str, entry:
 
 
 def check_input(context: RuleContext) -> Iterator[Diagnostic]:
-    """Evaluators of an open loop that would stop before the test does, by a default of theirs."""
-    spec = context.spec
-    for service in context.services if context.test.is_complete and spec.kind != "closed-loop" else ():
+    """Evaluators whose default ends them before the test, and those that expect other times than frames have."""
+    spec, services = context.spec, context.services if context.test.is_complete else ()
+    unsure: Severity = "error" if spec.clock == "lockstep" else "warning"
+    player = next((s for s in services if "rec" in s.texts and s.use.layer == "environment"), None)
+    for service in services if spec.kind != "closed-loop" else ():
         for name, argument in service.arguments.items():
             is_default = argument.parameter.within_timeout and not argument.entry and argument.text
             if is_default and float(argument.text or 0) < (spec.timeout_s or 0.0):
@@ -190,6 +192,12 @@ def check_input(context: RuleContext) -> Iterator[Diagnostic]:
                 hint = f"write '{name}: ...', how long it is to judge"
                 message += "as nothing ends the input"
                 yield Diagnostic(service.use.span, "input-limit", message, hint, "warning")
+        is_copied = service.texts.get("align") == "sample-time" and "target" in service.texts
+        if player and "align" in service.texts and player.texts.get("sample-times") == "recorded" and not is_copied:
+            message = f"'{service.use.name}' expects samples with times of the test, and frames of '{player.use.name}' "
+            hint = f"write 'sample-times: test' under 'with' of '{player.use.name}'"
+            message += "keep those of the recording"
+            yield Diagnostic(service.use.span, "input-limit", message, hint, unsure)
 
 
 def check_limits(context: RuleContext) -> Iterator[Diagnostic]:
