@@ -49,14 +49,12 @@ class ComposeFiles:
         self.passed = passed
         self.problems: list[Diagnostic] = []
         self.known: dict[str, str] = {}
-        self.included: dict[str, str] = {}
-        """The variables of the file that is being included, which those that are known come before."""
         self.secrets: dict[str, Path] = {}
         self.written: dict[Span, str] = {}
         self.unset: dict[Span, set[str]] = {}
-        """Variables without a default by their places, but for those that the included file has by itself."""
+        """Variables without a default, by their places."""
         self._read: dict[Path, source.Mapping | None] = {}
-        self._documents: dict[tuple[Path, Path, frozenset[tuple[str, str]]], source.Mapping | None] = {}
+        self._documents: dict[tuple[Path, Path], source.Mapping | None] = {}
         self._nodes = 0
 
     def filled(self, text: str, own: Mapping[str, str] | None = None, *, is_path: bool = True) -> str:
@@ -66,11 +64,7 @@ class ComposeFiles:
         """
         match = _FOLDER.match(text) if is_path else None
         text = _FOLDERS[match["braced"] or match["bare"]] + text[match.end() :] if match else text
-        return filled(text, {**(own or {}), **self.included, **self.known}, self.is_late)
-
-    def _of_include(self, text: str) -> str:
-        """A text that each test fills in, with the variables that only an included file has."""
-        return filled(text, self.included, lambda name: name in self.known or name not in self.included)
+        return filled(text, {**(own or {}), **self.known}, self.is_late)
 
     def is_late(self, name: str) -> bool:
         """Whether a variable has its value only when a test runs."""
@@ -114,7 +108,7 @@ class ComposeFiles:
 
     def document(self, file: Path, folder: Path) -> source.Mapping | None:
         """A file whose paths are relative to ``folder``, with them relative to the application's own folder."""
-        node, key = self.read(file), (file, folder, frozenset(self.included.items()))
+        node, key = self.read(file), (file, folder)
         if key not in self._documents:
             self._documents[key] = None if node is None else self._changed(node, folder)
         return self._documents[key]
@@ -138,10 +132,10 @@ class ComposeFiles:
             problem = Diagnostic(word.span, "application-file", *slip)
             self.problems += [problem] if problem not in self.problems else []
         self.written[word.span] = text
-        self.unset[word.span] = without_default(text) - self.included.keys()
+        self.unset[word.span] = without_default(text)
         key = place[2] if place[0] == "services" and len(place) > 2 else ""
         if key in TEST_FILLED or key.startswith("x-"):
-            return self._of_include(text)
+            return text
         return self.filled(text, is_path=place[0] != "services" or key in _PATHS)
 
     def other(self, word: Scalar, folder: Path) -> Path | None:

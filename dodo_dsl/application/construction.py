@@ -187,11 +187,6 @@ class Construction:
             if key not in known:
                 hint = "indent it by 2: it looks like a service" if entries(entry.value).keys() & _OF_SERVICES else ""
                 of.unknown_key(key, top, "the compose file", known, hint)
-        for name, node, span in self._named("networks"):
-            external = node.get("external") if isinstance(node, Mapping) else None
-            if isinstance(external, Mapping) or (isinstance(external, Scalar) and is_true(external.value)):
-                message = f"the network '{name}' is external, and a test has its own network only"
-                of.add(Diagnostic(span, "application-key", message, severity="warning"))
 
 
 def checked_builds(application: ApplicationSource) -> dict[str, Any]:

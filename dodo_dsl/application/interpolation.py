@@ -141,11 +141,8 @@ def slip_in(text: str) -> tuple[str, str] | None:
 
 
 def _slip(written: str) -> tuple[str, str]:
-    shown = written[:_SHOWN]
-    if written.count("{") != written.count("}"):
-        return "'${' is not closed", f"write '{written.split(maxsplit=1)[0][:_SHOWN]}}}'"
-    what = "write ${NAME:-default}, with letters, digits and underscores in the name"
-    return f"'{shown}' is not a variable of compose", f"{what}; text that begins with ${{ is written $${{"
+    what = "write ${NAME:-default}, closed, with letters, digits and underscores in the name"
+    return f"'{written[:_SHOWN]}' is not a variable of compose", f"{what}; text that begins with ${{ is written $${{"
 
 
 class DotenvProblem(EnvironmentProblem):

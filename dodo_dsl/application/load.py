@@ -119,12 +119,9 @@ def _included(files: ComposeFiles, item: Node, folder: Path, chain: tuple[Path, 
         return None
     project = Path(os.path.normpath(folder / place.text)) if isinstance(place, Scalar) else found[0].parent
     own = [files.other(word, folder) for word in scalars(source.part(item, "env_file"))] or [project / ".env"]
-    before = files.included
     taken = [word for name in found for word in _variables_of_secrets(files, name)]
-    files.included = {**before, **{k: v for file in own if file for k, v in files.gather(file, taken).items()}}
-    part = _all(files, found, project, chain)
-    files.included = before
-    return part
+    files.known = {**{k: v for file in own if file for k, v in files.gather(file, taken).items()}, **files.known}
+    return _all(files, found, project, chain)
 
 
 def _joined(files: ComposeFiles, document: source.Mapping, part: source.Mapping) -> source.Mapping:

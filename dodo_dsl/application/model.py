@@ -130,13 +130,8 @@ class ComposeService:
     @property
     def has_display(self) -> bool:
         """Whether its process is to have an X server."""
-        return self._true("display") is not None
-
-    def _true(self, key: str) -> Span | None:
-        """The place of a key of ``x-dodo`` that is true."""
-        entry = source.entries(self.node, KEYS[0]).get(key)
-        is_true = entry is not None and isinstance(entry.value, Scalar) and entry.value.value is True
-        return entry.key if entry and is_true else None
+        display = source.part(self.node, KEYS[0], "display")
+        return isinstance(display, Scalar) and display.value is True
 
 
 @dataclass(frozen=True)

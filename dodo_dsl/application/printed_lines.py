@@ -45,13 +45,10 @@ def compiled(pattern: str) -> Any:
 def line_problems(line: PrintedLine, known: Mapping[str, Definition]) -> Iterator[Diagnostic]:
     """What is wrong with a pattern and its groups; ``known`` are the messages, an unknown one is another rule's."""
     name, slash, stamp = line.message.partition("/")
-    if slash:
-        hint = f"write 'message: {name}' and 'sender: {stamp}'"
-        yield Diagnostic(line.message_span, LINES_RULE, f"'{line.message[:80]}' is a message with a stamp", hint)
-        return
-    if name.startswith(("dodo.", "cluon.")):
-        message = f"{name} is not the application's to send"
-        yield Diagnostic(line.message_span, LINES_RULE, message, "name a message of OpenDLV's, or one of your own")
+    if slash or name.startswith(("dodo.", "cluon.")):
+        message = f"'{line.message[:80]}' is not a message of OpenDLV's, or of your own"
+        hint = f"write 'message: {name}' and 'sender: {stamp}'" if slash else ""
+        yield Diagnostic(line.message_span, LINES_RULE, message, hint)
         return
     try:
         pattern = compiled(line.match)
@@ -59,25 +56,14 @@ def line_problems(line: PrintedLine, known: Mapping[str, Definition]) -> Iterato
         yield Diagnostic(line.match_span, LINES_RULE, f"the pattern cannot be read: {error}", _SYNTAX)
         return
     groups = [group.decode(errors="replace") for group in pattern.groupindex]
-    if not pattern.groups:
-        hint = "name each part of the line that is a field, for example (?P<groundSteering>[-+.0-9eE]+)"
-        yield Diagnostic(line.match_span, LINES_RULE, "the pattern has no group, so that no field gets a value", hint)
-    elif pattern.groups > len(groups):
-        message = "the pattern has a group that no field alone takes"
-        yield Diagnostic(line.match_span, LINES_RULE, message, "name each once, as in (?P<field>...), or write (?:...)")
-    if name in known:
-        yield from _unknown_fields(line, groups, known[name])
-
-
-def _unknown_fields(line: PrintedLine, groups: list[str], definition: Definition) -> Iterator[Diagnostic]:
-    types = {field.name: field.type for field in definition.fields}
+    if not groups or pattern.groups > len(groups):
+        message = "each group of the pattern needs the name of a field, and one is needed"
+        hint = "name them, for example (?P<groundSteering>[-+.0-9eE]+), or write (?:...)"
+        yield Diagnostic(line.match_span, LINES_RULE, message, hint)
+    fields = [field.name for field in known[name].fields if field.type in SCALARS] if name in known else groups
     for group in groups:
-        if group != SAMPLE_TIME and group not in types:
-            message = f"{definition.name} has no field '{group[:80]}'"
-            fields = ", ".join([*types, SAMPLE_TIME])
-            hint = did_you_mean(group, [*types, SAMPLE_TIME]) or f"groups of the pattern may be {fields}"
+        if group not in (*fields, SAMPLE_TIME):
+            message = f"{name} has no field '{group[:80]}' with one value"
+            hint = did_you_mean(group, [*fields, SAMPLE_TIME])
             hint = "write 'sender: 0' next to 'match' for a sender stamp" if group == "sender" else hint
             yield Diagnostic(line.match_span, LINES_RULE, message, hint)
-        elif group in types and types[group] not in SCALARS:
-            message = f"field '{group}' of {definition.name} is a message itself, which a line cannot give"
-            yield Diagnostic(line.match_span, LINES_RULE, message, "leave that group out")

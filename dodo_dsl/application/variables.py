@@ -120,9 +120,6 @@ def _of_files(service: ComposeService, values: Mapping[str, str], is_late: Calla
     return made
 
 
-_RULE = "application-file"
-
-
 def tunables(application: ApplicationSource) -> tuple[Range, ...]:
     """The parameters of all services, by the names of their variables, in the order in which they are written.
 
@@ -137,27 +134,22 @@ def tunables(application: ApplicationSource) -> tuple[Range, ...]:
 
 def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Parameters that are DoDo's own, without a range, or with different ones at several services."""
-    seen: dict[str, tuple[str, list[float]]] = {}
+    seen: dict[str, list[str]] = {}
     for service in application.services.values():
         for name, entry in source.entries(service.node, "x-dodo", "tune").items():
             found = _range(name, entry)
-            ends = (*found.ends, found.nominal)
-            low, high, default = numbers = [float(str(end.value)) for end in ends]
+            low, high, default = ends = (*found.ends, found.nominal)
+            message, span = "", entry.key
             if why := owner(name):
-                yield Diagnostic(entry.key, _RULE, f"'{name}' cannot be tuned: {why}")
+                message = f"'{name}' cannot be tuned: {why}"
             elif wrong := next((end for end in ends if not _is_decimal(end.text)), None):
-                yield Diagnostic(wrong.span, _RULE, f"'{wrong.text}' is not a finite decimal number")
-            elif low >= high:
-                message = f"'from' is {ends[0].text}, expected less than 'to', {ends[1].text}"
-                yield Diagnostic(ends[0].span, _RULE, message)
-            elif not low <= default <= high:
-                message = f"'default' is {ends[2].text}, expected {ends[0].text} to {ends[1].text}"
-                yield Diagnostic(ends[2].span, _RULE, message)
-            elif (first := seen.setdefault(name, (service.name, numbers)))[1] != numbers:
-                message = (
-                    f"'{name}' has another range at '{first[0]}', expected the same one: a parameter has one value"
-                )
-                yield Diagnostic(entry.key, _RULE, message)
+                message, span = f"'{wrong.text}' is not a finite decimal number", wrong.span
+            elif not number(low.text) <= number(default.text) <= number(high.text) != number(low.text):
+                message, span = f"'default' is {default.text}, expected {low.text} to {high.text}", default.span
+            elif seen.setdefault(name, [end.text for end in ends]) != [end.text for end in ends]:
+                message = f"'{name}' has another range at another service, expected one: a parameter has one value"
+            if message:
+                yield Diagnostic(span, "application-file", message)
 
 
 def _is_decimal(text: str) -> bool:

@@ -16,7 +16,6 @@ from dodo_dsl.spec.manifest import Parameter
 from dodo_dsl.spec.registry import SUFFIX
 
 RULE = "wrong-file"
-STATE = "opendlv.sim.KinematicState"
 MAX_FILES = 5_000
 MAX_BYTES = 2 << 30
 _TEXT = (".json", ".csv", ".obj", ".txt", ".yml", ".yaml")

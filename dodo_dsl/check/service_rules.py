@@ -110,36 +110,25 @@ def _needs(service: ResolvedService, name: str) -> bool:
 
 
 def _missing(context: RuleContext, service: ResolvedService, before: Several[ResolvedService]) -> Iterator[Diagnostic]:
-    use, manifest = service.use, service.manifest
+    use, manifest, rig = service.use, service.manifest, context.rig
     for parameter in manifest.parameters.values():
-        if not _needs(service, parameter.name):
-            continue
+        name = parameter.name
         is_on_rig = bool(context.spec.rig) or context.spec.level == "hil"
-        if parameter.rig and (context.rig.entry(parameter.rig) if context.rig else is_on_rig):
+        if not _needs(service, name) or (parameter.rig and (rig.entry(parameter.rig) if rig else is_on_rig)):
             continue  # a rig that is unknown or missing may give it, too
-        if parameter.shared and not context.spec.is_whole:
-            continue  # a service that could not be read may give it
-        if parameter.shared and any(_needs(each, parameter.name) for each in before):
-            continue  # what is written there would be given here, too
-        givers = _givers(context, parameter.name) if parameter.shared else {}
-        if len(givers) == 1:
+        if parameter.shared and (not context.spec.is_whole or any(_needs(each, name) for each in before)):
+            continue  # a service that could not be read may give it, or one that has this problem, too
+        written = [other.parameters[name].value for other in context.spec.uses if name in other.parameters]
+        others = {value.text for value in written if isinstance(value, Scalar)}
+        if parameter.shared and written and len(others) < 2:
             continue
-        message = f"service '{manifest.name}' needs parameter '{parameter.name}': {parameter.help}"
-        hint = f"write '{parameter.name}: ...' under 'with'"
-        if parameter.rig and context.rig:
-            hint += f", or give the rig '{context.rig.name}' its '{parameter.rig}'"
-        if len(givers) > 1:
-            hint = f"{' and '.join(givers.values())} give different values, so write the one to use"
+        message = f"service '{manifest.name}' needs parameter '{name}': {parameter.help}"
+        hint = f"write '{name}: ...' under 'with'"
+        if parameter.rig and rig:
+            hint += f", or give the rig '{rig.name}' its '{parameter.rig}'"
+        if parameter.shared and written:
+            hint = f"other services have {', '.join(sorted(others))}, so write the one to use"
         yield Diagnostic(use.span, "missing-parameter", message, hint)
-
-
-def _givers(context: RuleContext, name: str) -> dict[str, str]:
-    """The values that services of the test give to a parameter, each with the first service's name."""
-    givers: dict[str, str] = {}
-    for use in context.spec.uses:
-        if name in use.parameters:
-            givers.setdefault(getattr(use.parameters[name].value, "text", ""), use.name)
-    return givers
 
 
 def check_messages(context: RuleContext) -> Iterator[Diagnostic]:
