@@ -1,7 +1,4 @@
-"""Problems of an application beside those of its keys, which are judged where its services are made.
-
-A service has a name and a program; together they have cycles of dependencies, and buses.
-"""
+"""Problems of an application beside those of its keys, which are judged where its services are made."""
 
 import difflib
 from collections.abc import Collection, Iterator, Sequence

@@ -1,7 +1,4 @@
-"""The application as it is written: its services, their variables, and the messages that they produce and consume.
-
-Variables are the one for a service's image, those that files set, and those that carry the CID.
-"""
+"""The application as it is written: its services, their variables, and the messages that they produce and consume."""
 
 import functools
 import re

@@ -1,7 +1,4 @@
-"""What a test's containers mount: files of the repository to be read, copies of its folders, the test's own volumes.
-
-Whatever is neither of these is refused, or is a rig's hardware.
-"""
+"""What a test's containers mount: files of the repository to be read, copies of its folders, the test's own volumes."""
 
 import os
 import re

@@ -46,7 +46,7 @@ def line_problems(line: PrintedLine, known: Mapping[str, Definition]) -> Iterato
     """What is wrong with a pattern and its groups; ``known`` are the messages, an unknown one is another rule's."""
     name, slash, stamp = line.message.partition("/")
     if slash or name.startswith(("dodo.", "cluon.")):
-        message = f"'{line.message[:80]}' is not a message of OpenDLV's, or of your own"
+        message = f"'{line.message[:80]}' is not the name of a message that an application sends"
         hint = f"write 'message: {name}' and 'sender: {stamp}'" if slash else ""
         yield Diagnostic(line.message_span, LINES_RULE, message, hint)
         return

@@ -1,7 +1,4 @@
-"""``x-dodo: {ros: {in: ..., out: ...}}``: the topics of a ROS 2 node as they are written, and the bridge to them.
-
-The bridge is a service of DoDo's that stands beside the application's own, in their network, memory and time.
-"""
+"""``x-dodo: {ros: {in: ..., out: ...}}``: the topics of a ROS 2 node as they are written, and the bridge to them."""
 
 import contextlib
 import re

@@ -1,8 +1,4 @@
-"""Variables of an application: those that a test sets, and those that ``dodo tune`` varies.
-
-A test sets ``application: {env: {SPEED: 0.5}}``. The application has parameters to tune by
-``x-dodo: {tune: {KP: {from: 0.2, to: 3, default: 1}}}``.
-"""
+"""Variables of an application: those that a test sets, and those that ``dodo tune`` varies."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping

@@ -13,8 +13,8 @@ from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Scalar, Sequence, read, walk
 from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService
-from dodo_dsl.spec.manifest import MANIFEST, holds
-from dodo_dsl.spec.slips import meant, unknown_key
+from dodo_dsl.spec.manifest import holds
+from dodo_dsl.spec.slips import unknown_key
 
 
 def check_services(context: RuleContext) -> Iterator[Diagnostic]:
@@ -24,7 +24,7 @@ def check_services(context: RuleContext) -> Iterator[Diagnostic]:
             if use.layer not in manifest.layers:
                 message = f"service '{manifest.name}' does not fit layer {use.layer}"
                 yield Diagnostic(use.uses.span, "wrong-layer", message, f"move it to {' or '.join(manifest.layers)}")
-        elif not _is_broken(context, use.uses.text):
+        else:
             hint = did_you_mean(use.uses.text, context.manifests) or "'dodo list --services' shows those that there are"
             message, fix = f"unknown service '{use.uses.text}'", only_fix(use.uses.text, context.manifests)
             yield Diagnostic(use.uses.span, "unknown-service", message, hint, fix=fix)
@@ -39,14 +39,6 @@ def check_services(context: RuleContext) -> Iterator[Diagnostic]:
         if context.application and use.name in context.application.services:
             message = f"the application also has a service '{use.name}'"
             yield Diagnostic(use.span, "service-taken", message, "rename the one in the test")
-
-
-def _is_broken(context: RuleContext, name: str) -> bool:
-    """Whether there is the user's own service in a folder of this name, whose manifest is reported itself."""
-    read = {manifest.folder for manifest in context.manifests.values()}
-    patterns = (MANIFEST, f"*/{MANIFEST}")
-    found = (file.parent for above in context.deployment.services for each in patterns for file in above.glob(each))
-    return name.replace("_", "-") in {folder.name.replace("_", "-") for folder in found if folder not in read}
 
 
 def check_parameters(context: RuleContext) -> Iterator[Diagnostic]:
@@ -97,16 +89,10 @@ def _without_effect(service: ResolvedService, argument: Argument, entry: Entry) 
     return Diagnostic(entry.key, "unused-parameter", message, f"remove it, or write {wanted}")
 
 
-def _misspelt(service: ResolvedService) -> set[str]:
-    """The parameters that unknown ones most likely mean, which are not missing as well."""
-    known = service.manifest.parameters
-    return {meant(name, known) for name in service.use.parameters if name not in known}
-
-
 def _needs(service: ResolvedService, name: str) -> bool:
     """Whether a parameter is required of a service, and not written there."""
     parameter = service.manifest.parameters.get(name)
-    return parameter is not None and parameter.required and name not in {*service.use.parameters, *_misspelt(service)}
+    return parameter is not None and parameter.required and name not in service.use.parameters
 
 
 def _missing(context: RuleContext, service: ResolvedService, before: Several[ResolvedService]) -> Iterator[Diagnostic]:

@@ -1,7 +1,4 @@
-"""The wiring of a test: what its services produce and consume, and what is required of the application.
-
-Of it follow the rate of the steps of lockstep, and the messages that answer a frame.
-"""
+"""The wiring of a test: what its services produce and consume, and what is required of the application."""
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence

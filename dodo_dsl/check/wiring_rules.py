@@ -28,14 +28,10 @@ def check_producers(context: RuleContext) -> Iterator[Diagnostic]:
         return  # unknown services and wrong layers come first
     wiring = context.wiring
     known = {*context.messages, ANYTHING}
-    misspelt = any(_is_unknown(end, known) for end in wiring.application_produces)
-    own_misspelt = any(_is_unknown(end, known) for end in wiring.produced)
     for end in wiring.consumed:
-        if (misspelt and end.port.can_be_required) or (own_misspelt and end.port.kind == "message"):
-            continue  # the misspelt one may be meant
-        if _is_unknown(end, known):
-            continue  # its name is reported itself
-        if not (end.port.optional or wiring.application_may_produce(end.port) or wiring.producers(end.port)):
+        if end.port.optional or (end.port.kind == "message" and end.port.name not in known):
+            continue  # an unknown message is reported where it is written
+        if not (wiring.application_may_produce(end.port) or wiring.producers(end.port)):
             yield _unsatisfied(context, wiring, end)
     yield from _twice(wiring)
     yield from _judged(wiring)
@@ -63,11 +59,6 @@ def check_hidden_messages(context: RuleContext) -> Iterator[Diagnostic]:
         message = f"the application's '{end.service}' takes {end.port}, which only a simulation has: '{name}' hides it"
         hint = "take it out of x-dodo.in, or write 'pose: declared' in your own test"
         yield Diagnostic(end.span, "true-pose", message, hint)
-
-
-def _is_unknown(end: End, known: Collection[str]) -> bool:
-    """Whether it is an unknown message, which is reported where it is written."""
-    return end.port.kind == "message" and end.port.name not in known
 
 
 def _unsatisfied(context: RuleContext, wiring: Wiring, end: End) -> Diagnostic:

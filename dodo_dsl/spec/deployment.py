@@ -1,7 +1,4 @@
-"""The deployment: ``dodo.yml`` at the root of a user's repository.
-
-``services`` are folders that hold a folder with a manifest for each service.
-"""
+"""The deployment: ``dodo.yml`` at the root of a user's repository."""
 
 import ipaddress
 import os

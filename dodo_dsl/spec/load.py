@@ -105,11 +105,8 @@ def _nothing_in(file: Path) -> Diagnostic:
 def resolve(node: Node, file: Path, root: Path, reader: Reader = read) -> tuple[Node, list[Diagnostic]]:
     """The spec merged over everything that it extends; spans keep the file that each value was written in.
 
-    Mappings merge deeply, scalars and lists replace, null removes.
-
-    It stays as it is, with its key ``extends``, where one of the files that it is built on cannot be read.
-
-    ``root`` is the registry's folder, which holds all files of the chain.
+    Mappings merge deeply, scalars and lists replace, null removes. It keeps its key ``extends`` where one of the files
+    cannot be read. ``root`` is the registry's folder, which holds all of them.
     """
     return _resolve(node, (file,), root.resolve(), reader)
 

@@ -1,7 +1,4 @@
-"""Service manifests: a service with its layers, parameters and ports, and rules that the schema cannot express.
-
-``wrong-manifest``: what concerns two places of a manifest.
-"""
+"""Service manifests: a service with its layers, parameters and ports, and rules that the schema cannot express."""
 
 import functools
 import re

@@ -1,7 +1,4 @@
-"""``matrix``: an instance of a spec for each choice of values, which replace placeholders as ``${matrix.light}``.
-
-Placeholders of ``vary`` are of the same form.
-"""
+"""``matrix``: an instance of a spec for each choice of values, which replace placeholders as ``${matrix.light}``."""
 
 import functools
 import itertools

@@ -1,8 +1,4 @@
-"""A spec as it was written, with its goals and the resources that it allows.
-
-Fields that are missing or not valid are None. Soft goals are scores of checks, by which ``dodo rank`` compares
-applications. ``resources`` are what each service of the application may use of the machine.
-"""
+"""A spec as it was written, with its goals and the resources that it allows."""
 
 import math
 from collections.abc import Iterator

@@ -1,7 +1,4 @@
-"""Finding specs, and what a test may be called: registries are folders, a test is ``<name>/<name>.dodo.yml``.
-
-A test is called as its file, which is a job of a pipeline, too.
-"""
+"""Finding specs, and what a test may be called: registries are folders, a test is ``<name>/<name>.dodo.yml``."""
 
 import glob
 import os

@@ -1,7 +1,4 @@
-"""A document against its JSON Schema: what is wrong, at its line and column, and the part of it that is valid.
-
-An error is explained by the keyword of the schema that it violates, and by the schema around that keyword.
-"""
+"""A document against its JSON Schema: what is wrong, at its line and column, and the part of it that is valid."""
 
 import contextlib
 import functools

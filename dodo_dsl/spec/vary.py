@@ -1,7 +1,4 @@
-"""``vary``: ranges of values, which replace placeholders as ``${vary.light}``.
-
-A plain run takes the nominal values; ``dodo search`` looks for conditions within the ranges.
-"""
+"""``vary``: ranges of values, which replace placeholders as ``${vary.light}``."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
