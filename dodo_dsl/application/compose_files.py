@@ -52,7 +52,7 @@ class ComposeFiles:
         self.secrets: dict[str, Path] = {}
         self.written: dict[Span, str] = {}
         self.unset: dict[Span, set[str]] = {}
-        """Variables without a default, by their places."""
+        """Variables without a default, by their places, where no test can give them a value."""
         self._read: dict[Path, source.Mapping | None] = {}
         self._documents: dict[tuple[Path, Path], source.Mapping | None] = {}
         self._nodes = 0
@@ -132,10 +132,10 @@ class ComposeFiles:
             problem = Diagnostic(word.span, "application-file", *slip)
             self.problems += [problem] if problem not in self.problems else []
         self.written[word.span] = text
-        self.unset[word.span] = without_default(text)
         key = place[2] if place[0] == "services" and len(place) > 2 else ""
         if key in TEST_FILLED or key.startswith("x-"):
             return text
+        self.unset[word.span] = without_default(text)
         return self.filled(text, is_path=place[0] != "services" or key in _PATHS)
 
     def other(self, word: Scalar, folder: Path) -> Path | None:

@@ -105,7 +105,7 @@ def read_application(
     construction = Construction(application, Setting(1, "network", application.folder, limits=limits))
     found.extend(application_problems(application, construction, next(iter(services.values())).key))
     found.extend(tunable_problems(application))
-    found += [*_withheld(application, files), *_empty(application, files)]
+    found += _unknown_variables(application, files)
     if application.speaks_ros:
         node = bridge()
         raw = {"command": node.entries["command"].value}
@@ -197,38 +197,28 @@ def _declaration_problems(
             yield Diagnostic(entry.key, "application-file", message, "remove one of them")
 
 
-def _withheld(application: ApplicationSource, files: ComposeFiles) -> Iterator[Diagnostic]:
-    """Variables that the files name and that a test does not get, though they are in DoDo's own environment."""
+def _unknown_variables(application: ApplicationSource, files: ComposeFiles) -> Iterator[Diagnostic]:
+    """Variables that a test does not get, though they are in DoDo's own environment, and others that are empty."""
     seen = {*files.known, *files.secrets, *files.passed, *_OF_FOLDER}
-    nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
-    for name, span in itertools.chain.from_iterable(_named(node, "", files.written) for node in nodes):
+    services = (service.node.entries.items() for service in application.services.values())
+    carried = [(key, e.value) for key, e in itertools.chain.from_iterable(services) if is_carried(key)]
+    named = (_named(node, key, files.written) for key, node in (*carried, *application.rest.items()))
+    for name, span in itertools.chain.from_iterable(named):
         is_secret = secret_variables.holds_secret(name, os.environ.get(name, ""))
-        if (is_secret or name in os.environ) and name not in seen and not name.startswith("DODO_IMAGE_"):
-            seen.add(name)
+        if name in seen or name.startswith("DODO_IMAGE_"):
+            continue
+        if is_secret or name in os.environ:
             why = "looks like a secret" if is_secret else "is of DoDo's own environment"
             message = f"variable '{name}' {why}, so it is unset in a test"
             hint = f"to pass it, write environment: [{name}] in dodo.yml"
             yield Diagnostic(span, "application-secret", message, hint, "warning")
-
-
-def _unset(span: Span, files: ComposeFiles) -> list[str]:
-    """The variables in what is written at a place that have no value there, and are not DoDo's own."""
-    known = {*files.known, *files.secrets, *files.passed, *os.environ, *_OF_FOLDER}
-    return sorted(files.unset.get(span, set()) - known)
-
-
-def _empty(application: ApplicationSource, files: ComposeFiles) -> Iterator[Diagnostic]:
-    """Variables without a value where no test can give them one."""
-    seen = set[str]()
-    for service in application.services.values():
-        kept = (e.value for key, e in service.node.entries.items() if is_carried(key) and key not in TEST_FILLED)
-        for part in itertools.chain.from_iterable(map(source.walk, kept)):
-            for name in _unset(part.span, files):
-                if name not in seen:
-                    seen.add(name)
-                    message = f"variable '{name}' has no value, so it is empty here"
-                    hint = f"set it in .env beside this file, or write a default: ${{{name}:-...}}"
-                    yield Diagnostic(part.span, "application-required", message, hint, "warning")
+        elif name in files.unset.get(span, ()):
+            message = f"variable '{name}' has no value, so it is empty here"
+            hint = f"set it in .env beside this file, or write a default: ${{{name}:-...}}"
+            yield Diagnostic(span, "application-required", message, hint, "warning")
+        else:
+            continue
+        seen.add(name)
 
 
 def _named(node: Node, key: str, texts: dict[Span, str]) -> Iterator[tuple[str, Span]]:
