@@ -140,7 +140,9 @@ def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
                 message = f"'{name}' cannot be tuned: {why}"
             elif wrong := next((end for end in ends if not _is_decimal(end.text)), None):
                 message, span = f"'{wrong.text}' is not a finite decimal number", wrong.span
-            elif not number(low.text) <= number(default.text) <= number(high.text) != number(low.text):
+            elif number(low.text) >= number(high.text):
+                message, span = f"'from' is {low.text}, expected less than 'to', {high.text}", low.span
+            elif not number(low.text) <= number(default.text) <= number(high.text):
                 message, span = f"'default' is {default.text}, expected {low.text} to {high.text}", default.span
             elif seen.setdefault(name, [end.text for end in ends]) != [end.text for end in ends]:
                 message = f"'{name}' has another range at another service, expected one: a parameter has one value"
