@@ -11,7 +11,7 @@ from dodo_dsl import source
 from dodo_dsl.application import merge
 from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.application.model import scalars, with_entry
-from dodo_dsl.diagnostics import did_you_mean
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
 from dodo_dsl.source import Entry, Node, Scalar
 
 MAX_DEPTH = 8
@@ -177,3 +177,17 @@ def _base(files: ComposeFiles, entry: Entry, chain: tuple[Service, ...]) -> Node
     elif document:
         files.problem(word.span, f"unknown service '{base.name}' to extend", did_you_mean(base.name, entries))
     return None
+
+
+def overrides(paths: Sequence[Path]) -> Iterator[Diagnostic]:
+    """A warning if compose would read an override file together with the one file of ``paths``."""
+    first = paths[0]
+    if len(paths) == 1 and first.name in _OVERRIDDEN:
+        for found in sorted(first.parent.glob("*compose.override.y*ml"))[:1]:
+            message = f"'docker compose' also reads '{found.name}', which it finds next to this file; DoDo does not"
+            hint = f"name both files in dodo.yml: application: [{first.name}, {found.name}]; to test without it, name "
+            hint += f"another file there that has include: [{first.name}]"
+            yield Diagnostic(Span(str(first)), "application-override", message, hint, "warning")
+
+
+_OVERRIDDEN = ("compose.yaml", "compose.yml", "docker-compose.yaml", "docker-compose.yml")

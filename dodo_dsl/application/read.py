@@ -19,7 +19,7 @@ from dodo_dsl.application.construction import Construction, Setting
 from dodo_dsl.application.container import is_carried
 from dodo_dsl.application.host_paths import INSIDE, link_out, repository
 from dodo_dsl.application.interpolation import names
-from dodo_dsl.application.load import load
+from dodo_dsl.application.load import load, overrides
 from dodo_dsl.application.merge import joined
 from dodo_dsl.application.model import (
     KEYS,
@@ -102,6 +102,7 @@ def read_application(
         top=document.entries,
         cids=tuple(filter(None, map(declared_cid, [document, *(service.node for service in kept.values())]))),
     )
+    found.extend(() if "COMPOSE_FILE" in files.known else overrides(paths))
     construction = Construction(application, Setting(1, "network", application.folder, limits=limits))
     found.extend(application_problems(application, construction, next(iter(services.values())).key))
     found.extend(tunable_problems(application))

@@ -2,13 +2,15 @@
 
 import functools
 import json
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from dodo_dsl.check.resolve import RuleContext, known_ids
+from dodo_dsl.check import wiring
+from dodo_dsl.check.resolve import IMAGE, RuleContext, known_ids, without_pictures
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.opendlv.assets import formats, map_file
+from dodo_dsl.opendlv.assets import formats, map_file, recording_contents
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec.arguments import Argument, ResolvedService
@@ -178,25 +180,116 @@ def _within(context: RuleContext, service: ResolvedService, seconds: str, entry:
         yield Diagnostic(entry.value.span, "short-timeout", message, hint, "warning")
 
 
+_SINCE_1970 = 1e8
+"""Seconds; larger times count from 1970."""
+_CLOSE = 1e-9
+
+Unmet = tuple[str, str, str, Severity]
+"""A parameter that what the test shows cannot meet, why in words behind the service's name, and a hint."""
+
+
 def check_input(context: RuleContext) -> Iterator[Diagnostic]:
-    """Evaluators whose default ends them before the test, and those that expect other times than frames have."""
-    spec, services = context.spec, context.services if context.test.is_complete else ()
+    """In lockstep a frame has one answer, with its sample time; else an application may answer as often as it likes."""
+    spec, services = context.spec, context.services
     unsure: Severity = "error" if spec.clock == "lockstep" else "warning"
     player = next((s for s in services if "rec" in s.texts and s.use.layer == "environment"), None)
-    for service in services if spec.kind != "closed-loop" else ():
+    known = wiring.rates(services)
+    has_rate = not player and known.keys() & wiring.cameras_of(context.wiring)
+    period = 1 / wiring.step_hz(context.wiring, known) if has_rate else 0.0
+    for service in services if context.test.is_complete else ():
+        found: list[Unmet] = []
         for name, argument in service.arguments.items():
             is_default = argument.parameter.within_timeout and not argument.entry and argument.text
-            if is_default and float(argument.text or 0) < (spec.timeout_s or 0.0):
-                message = f"'{service.use.name}' judges {argument.text} s of the test's {spec.timeout_s:g} s, "
-                hint = f"write '{name}: ...', how long it is to judge"
-                message += "as nothing ends the input"
-                yield Diagnostic(service.use.span, "input-limit", message, hint, "warning")
-        is_copied = service.texts.get("align") == "sample-time" and "target" in service.texts
-        if player and "align" in service.texts and player.texts.get("sample-times") == "recorded" and not is_copied:
-            message = f"'{service.use.name}' expects samples with times of the test, and frames of '{player.use.name}' "
-            hint = f"write 'sample-times: test' under 'with' of '{player.use.name}'"
-            message += "keep those of the recording"
-            yield Diagnostic(service.use.span, "input-limit", message, hint, unsure)
+            if is_default and spec.kind != "closed-loop" and float(argument.text or 0) < (spec.timeout_s or 0.0):
+                why = f"judges {argument.text} s of the test's {spec.timeout_s:g} s, as nothing ends the input"
+                found.append((name, why, f"write '{name}: ...', how long it is to judge", "warning"))
+        if service.use.layer == "evaluation":
+            found += [*_times(service, player, unsure), *_frames(service, player, period, unsure)]
+        for name, why, hint, severity in found:
+            entry = service.use.parameters.get(name)
+            span = entry.value.span if entry else service.use.span
+            yield Diagnostic(span, "input-limit", f"'{service.use.name}' {why}", hint, severity)
+
+
+def _times(service: ResolvedService, player: ResolvedService | None, unsure: Severity) -> Iterator[Unmet]:
+    """Times of the target and of samples that never meet."""
+    is_copied = service.texts.get("align") == "sample-time" and "target" in service.texts
+    if player and "align" in service.texts and player.texts.get("sample-times") == "recorded" and not is_copied:
+        why = f"expects samples with times of the test, and frames of '{player.use.name}' keep those of the recording"
+        hint = f"write 'sample-times: test' under 'with' of '{player.use.name}'"
+        yield "align", why, hint, "warning" if without_pictures(player) else unsure
+    if judged := _judged(service):
+        first, begin, end = judged
+        if begin >= end:
+            why = f"has nothing to judge: the target begins at {first:,.10g} s, judged is {begin:,.10g} to {end:.10g} s"
+            hint = "write 'align: sample-time' for times since 1970" if first > _SINCE_1970 else "see from and until"
+            yield "target", why, hint, "error"
+        elif is_copied and first < _SINCE_1970:
+            why = f"aligns by sample times, which count from 1970, and its target begins at {first:g} s"
+            yield "target", why, "write 'align: begin' for seconds since the start of the test", "error"
+
+
+def _judged(service: ResolvedService) -> tuple[float, float, float] | None:
+    """When a table begins, and what of it is judged from when to when, in s; None where that is not known."""
+    texts, target = service.texts, service.arguments.get("target")
+    path = target.value.path if target and target.value else None
+    found = table_span(path, texts.get("target-field") or texts.get("field", "")) if path else None
+    if found is None:
+        return None
+    is_copied = texts.get("align") == "sample-time"
+    begin, end = (0.0, found[1] - found[0]) if is_copied else found
+    limits = [float(texts[name]) for name in ("until", "max-time")[: 1 if is_copied else 2] if name in texts]
+    return found[0], max(begin, float(texts.get("from", 0))), min(end, *limits, end)
+
+
+@functools.lru_cache(maxsize=256)
+def table_span(path: Path, field: str) -> tuple[float, float] | None:
+    """When a table of a target begins and ends, in s; None for a recording and a table that cannot be read."""
+    if path.suffix == formats.RECORDING:
+        return None
+    from dodo_dsl.opendlv.assets.table import read_target
+    from dodo_dsl.opendlv.envelope import MICROSECONDS
+
+    try:
+        times = [time / MICROSECONDS for time, _ in read_target(path, field)]
+    except InputError:
+        return None  # reported with the file
+    return times[0], times[-1]
+
+
+def _frames(
+    service: ResolvedService, player: ResolvedService | None, period: float, unsure: Severity
+) -> Iterator[Unmet]:
+    """More answers than there are frames in a recording or each ``period`` s, and a gap that is shorter than that."""
+    texts, judged = service.texts, _judged(service)
+    name = "min-samples" if "min-samples" in texts else "min-frames"
+    least = most = int(texts.get(name, 0))
+    path = player.arguments["rec"].value if player else None
+    if player and path and path.path and unsure == "error":
+        most = pictures(path.path, int(player.texts.get("video-sender", 0)), least)
+    elif period and judged and judged[1] < judged[2]:
+        most = math.floor(judged[2] / period + _CLOSE) - math.ceil(judged[1] / period - _CLOSE) + 1
+    elif period and name == "min-frames" and {"max-delay", "max-time"} <= texts.keys():
+        wait = 0.0 if "message" in texts else float(texts["max-delay"])  # responds counts an answer when it comes
+        most = math.floor((float(texts["max-time"]) - wait) / period + _CLOSE) + 1
+    if most < least:
+        why = f"expects {least} answers, and what it judges has {most} frame{'' if most == 1 else 's'}"
+        yield name, why, f"write '{name}: {most}' or less", unsure
+    gap = service.arguments.get("max-gap")
+    if gap and gap.text and not gap.parameter.shared and float(gap.text) < period - _CLOSE:
+        why = f"expects an answer each {float(gap.text):g} s, and frames come each {period:g} s"
+        yield "max-gap", why, f"write 'max-gap: {period:g} s' or more", unsure
+
+
+@functools.lru_cache(maxsize=256)
+def pictures(path: Path, sender: int, most: int) -> int:
+    """How many frames of a camera a recording has, up to so many; so many if it has none, or is damaged."""
+    try:
+        found = recording_contents.contents(path)
+    except OSError:
+        return most  # reported with the file
+    count = found.counts.get((known_ids(())[IMAGE], sender), 0)
+    return min(count, most) if count and found.is_whole else most
 
 
 def check_limits(context: RuleContext) -> Iterator[Diagnostic]:

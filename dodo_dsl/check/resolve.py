@@ -93,6 +93,12 @@ def _former_ids() -> frozenset[tuple[str, int]]:
     return frozenset((one.name, one.id) for one in odvd.load(STANDARD_0_9))
 
 
+def without_pictures(service: ResolvedService) -> bool:
+    """Whether a service plays a recording that has no frames."""
+    path = _recording(service)
+    return path is not None and not holds(path, known_ids(())[IMAGE], _NO_STAMP)
+
+
 def _recording(service: ResolvedService) -> Path | None:
     found = [a.value.path for a in service.arguments.values() if a.parameter.format == FORMAT and a.value]
     return found[0] if len(found) == 1 else None

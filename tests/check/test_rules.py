@@ -12,6 +12,10 @@ S, P, F = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionReq
 OLD = "float x; float y; float z; float roll; float pitch; float yaw;"
 
 
+END = "path: {uses: beacon, with: {length: 1 m}}"
+HOLD = "path: {uses: beacon, with: {length: 1 m, hold: true}}"
+
+
 def app(takes: str = "", sends: str = f"{S}, {P}") -> str:
     return (
         "# docker-compose.yml\nservices: {driver: {image: driver, command: --cid=1, "
@@ -37,16 +41,15 @@ def own(definition: str, takes: str = "") -> str:
     return text + (app(takes) if takes else "")
 
 
-def judged(path: str) -> str:
+def signal(path: str, limits: str, begin: float, end: float) -> str:
     return (
-        "kind: open-loop\ntimeout: 90 s\nenvironment:\n"
-        f"  camera: {{uses: virtual-camera, with: {{map-path: ../maps/plain}}}}\n  {path}\n"
-        f"evaluation: {{judge: {{uses: responds, with: {{message: {S}, freq: 10 Hz}}}}}}\n"
+        "kind: open-loop\nclock: lockstep\ntimeout: 90 s\nenvironment:\n"
+        f"  camera: {{uses: virtual-camera, with: {{map-path: ../maps/plain, freq: 10 Hz}}}}\n  {path}\n"
+        "evaluation:\n  judge:\n    uses: continuous-signal\n"
+        f"    with: {{message: {S}, field: groundSteering, target: ../t.csv, max-mean: 1{limits}}}\n"
+        f"# tests/t.csv\ntime,value\n{begin},0\n{end},0\n"
     )
 
-
-END = "path: {uses: beacon, with: {length: 1 m}}"
-HOLD = "path: {uses: beacon, with: {length: 1 m, hold: true}}"
 
 CHANGES = [
     (
@@ -73,6 +76,15 @@ CHANGES = [
         "base.dodo.yml:14:41 unknown-name, 12:86 unknown-name",
     ),
     ("timeout: 1 min\n" + track("goal: finish, max-time: 40 s"), ""),
+    (signal(END, "", 0, 0.5), "7:3 two-producers, 15:3 input-limit"),
+    (signal(END, ", min-samples: 6", 0, 0.5), "7:3 two-producers"),
+    (signal(END, ", from: 2 s, until: 2.8 s", 0, 9), "7:3 two-producers, 15:3 input-limit"),
+    (signal(END, ", max-gap: 50 ms", 0, 9), "7:3 two-producers, 17:121 input-limit"),
+    (signal(END, "", 1.7e9, 1.7e9 + 9), "7:3 two-producers, 17:89 input-limit"),
+    (signal(END, ", align: sample-time", 0, 9), "7:3 two-producers, 17:89 input-limit"),
+    (signal(HOLD, "", 0, 89), "7:3 two-producers, 15:3 input-limit"),
+    (signal(HOLD, ", max-time: 60 s", 0, 89), "7:3 two-producers"),
+    (signal(END, "", 0, 89), "7:3 two-producers"),
     (app("my.Own/3"), "docker-compose.yml:1:68 application-input, docker-compose.yml:1:68 unknown-message"),
     (
         "# dodo.yml\nmessages: [my.odvd]\n# my.odvd\nmessage my.Own [id = 3000] { float x [id = 1]; }\n"
@@ -134,5 +146,7 @@ def test_an_application_of_set_0_9_gets_its_frames(takes: str, tmp_path: Path) -
 def test_where_the_input_ends_by_itself_it_is_judged_for_the_tests_timeout(tmp_path: Path) -> None:
     for name, path, limit in (("a", END, "90"), ("b", HOLD, "60")):
         (tmp_path / name).mkdir()
-        judge = next(each for each in resolved(judged(path), tmp_path / name).services if each.use.name == "judge")
+        judge = next(
+            each for each in resolved(signal(path, "", 0, 9), tmp_path / name).services if each.use.name == "judge"
+        )
         assert judge.texts["max-time"] == limit
