@@ -1,6 +1,7 @@
 """OBJ files as triangles: welded, solids of revolution with fewer sides, and in the colours of their materials."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -62,19 +63,23 @@ def with_fewer_sides(vertices: Array, triangles: Indices) -> tuple[Array, Indice
     return weld(np.column_stack([directions * profile[:, :1] + middle[:2], profile[:, 1]]), triangles)
 
 
-def is_closed(triangles: Indices) -> bool:
+def _mesh(vertices: Array, triangles: Indices) -> Any:
+    from services.scene.mesh_library import trimesh
+
+    return trimesh.Trimesh(vertices, triangles, process=False)
+
+
+def is_closed(vertices: Array, triangles: Indices) -> bool:
     """Whether each edge is used once in each direction: the outside of such a mesh is known."""
-    edges = np.concatenate([triangles[:, (0, 1)], triangles[:, (1, 2)], triangles[:, (2, 0)]])
-    once = np.unique(edges, axis=0)
-    return len(once) == len(edges) and np.array_equal(once, np.unique(edges[:, ::-1], axis=0))
+    mesh = _mesh(vertices, triangles)
+    return bool(mesh.is_watertight and mesh.is_winding_consistent)
 
 
 def oriented(vertices: Array, triangles: Indices) -> Indices:
     """Triangles that all face outwards (counter-clockwise); those of an open mesh face both ways."""
-    if not is_closed(triangles):
+    if not is_closed(vertices, triangles):
         return np.concatenate([triangles, triangles[:, ::-1]])
-    volumes = np.linalg.det(vertices[triangles])
-    return triangles if volumes.sum() > 0 else triangles[:, ::-1]
+    return triangles if _mesh(vertices, triangles).volume > 0 else triangles[:, ::-1]
 
 
 def _loaded(path: Path, mesh: mesh_text.Mesh) -> tuple[Array, Indices, Indices]:

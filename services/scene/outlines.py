@@ -243,7 +243,7 @@ class Mesh:
     def load(cls, file: Path) -> Self:
         """Raises InputError."""
         vertices, triangles = load_obj(file)
-        return cls(vertices, triangles, is_closed(triangles))
+        return cls(vertices, triangles, is_closed(vertices, triangles))
 
     def at(self, height: float) -> Array:
         return slice_mesh(self.vertices, self.triangles, height)

@@ -49,7 +49,7 @@ def test_an_open_surface_shows_from_both_sides(obj):
 
 def test_a_fine_solid_of_revolution_gets_sixteen_sides(obj):
     vertices, triangles = load_obj(obj(cylinder(96)))
-    assert (len(vertices), is_closed(triangles)) == (32, True)
+    assert (len(vertices), is_closed(vertices, triangles)) == (32, True)
     assert np.hypot(vertices[:, 0], vertices[:, 1]) == pytest.approx(np.full(32, 0.5))
     assert trimesh.Trimesh(vertices, triangles, process=False).volume == pytest.approx(
         2.0 * 8 * 0.25 * math.sin(math.pi / 8)
