@@ -221,5 +221,5 @@ def check_cameras(context: RuleContext) -> Iterator[Diagnostic]:
             where = service.use.parameters.get("width") or rig.entry(f"{_OPTICS}.width")
             message = f"the camera of rig '{rig.name}' was measured in frames of {' x '.join(measured)}, "
             message += f"and '{service.use.name}' has them of {' x '.join(given)}"
-            hint = f"measure it again with 'dodo rig measure {rig.name} --camera', or take frames of the measured size"
+            hint = "measure it again, or take frames of the measured size"
             yield Diagnostic(where.value.span if where else service.use.span, "camera-size", message, hint)

@@ -70,7 +70,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         stdout.write(rig_truth.make(options, deployment, chosen[0], say) + "\n")
         return Exit.OK
     if options.action == "measure":
-        return rig_measure.measure(options, deployment, chosen[0], stdout, stderr)
+        return rig_measure.measure(options, chosen[0], stdout, stderr)
     results = [_one(options, rig, say) for rig in chosen]
     if options.json:
         stdout.write(json_text(results))
