@@ -5,17 +5,14 @@ log. Lines are matched in a thread of the test's own: RE2 lets the runner go on 
 """
 
 import asyncio
-import difflib
 import math
 import re
 import struct
 import time
-from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -28,7 +25,7 @@ from dodo_dsl.opendlv.relay import BUS
 from dodo_dsl.plan.added_services import CLOCK, RECORDER
 from dodo_dsl.plan.model import Line, Plan
 from dodo_dsl.run.announce import frame_of
-from dodo_dsl.run.protocol import Say, Unmatched
+from dodo_dsl.run.protocol import Say
 
 MAX_LINE = 1 << 16
 """Bytes; what is longer is log."""
@@ -37,7 +34,7 @@ MAX_PAYLOAD = 1 << 15
 _MOST_WAITING = 50_000
 """Messages of a service in a step; the clock takes far fewer."""
 LINES_READ = "dodo.LinesRead"
-_MOST_UNMATCHED, _WIDTH = 100, 200
+_WIDTH = 200
 _INTEGER = re.compile(rb"[-+]?[0-9]{1,20}")
 _NUMBER = re.compile(rb"[-+]?(([0-9]+\.?[0-9]*|\.[0-9]+)(e[-+]?[0-9]+)?|nan|inf(inity)?)", re.IGNORECASE)
 _UNITS = {"us": 1, "ms": 1000, "s": 1_000_000}
@@ -51,7 +48,6 @@ _FOR_TERMINALS = re.compile(
     rb"|[ -/]*[0-Z\\^-~])"
 )
 """Control sequences of ECMA-48."""
-_GROUP = re.compile(r"\(\?P<[^>]*>|[][()?*+|^$\\]|\{[0-9,]*\}")
 
 
 class NoValue(ValueError):
@@ -153,92 +149,47 @@ class LinePattern:
 
 @dataclass
 class ServiceLines:
-    """The lines of one service so far: the last one that matched, and those that did not since.
-
-    ``notes`` are sentences about lines that make no message.
-    """
+    """The lines of one service so far; ``notes`` are sentences about lines that make no message."""
 
     service: str
     patterns: Sequence[LinePattern]
-    matched: int = 0
+    has_matched: bool = False
     last: bytes = b""
-    unmatched: deque[bytes] = field(default_factory=lambda: deque(maxlen=_MOST_UNMATCHED))
-    said: set[str] = field(default_factory=set)
-    notes: list[str] = field(default_factory=list)
+    """The last line that matched nothing."""
+    notes: dict[str, str] = field(default_factory=dict)
+    """By what is wrong, as each is said once; empty when it was."""
     is_over: bool = False
     """Whether nothing more is to be matched."""
-    unfinished: bytes = b""
-    """A line without its end that has matched: it does not count once more when that comes."""
 
-    def take(self, lines: Sequence[bytes], is_finished: bool = True) -> list[Printed]:
-        """The messages of lines, as many as patterns match; a line without its end only counts if one matches.
-
-        Where the terminal made a program colour it, or write over it, it is matched as without, then as it is.
-        """
+    def take(self, lines: Iterable[bytes]) -> list[Printed]:
+        """The messages of lines, as many as patterns match; colours and what was written over do not count."""
         found = list[Printed]()
-        for line in (each.rstrip(b"\r") for each in lines):
-            if not line or line != self.unfinished:
-                made = self._taken(line, is_finished)
-                self.unfinished = b"" if is_finished or not made else line
+        for line in lines:
+            for part in _FOR_TERMINALS.sub(b"", line).split(b"\r") if len(line) <= MAX_LINE else ():
+                made = [] if self.is_over else self._printed(part)
+                self.has_matched |= bool(made)
+                self.last = part if part.strip() and not made else self.last
                 found += made
-            elif is_finished:
-                self.unfinished = b""
         return found
 
-    def _taken(self, line: bytes, is_finished: bool) -> list[Printed]:
-        parts, found = [line], list[Printed]()
-        if (b"\x1b" in line or b"\r" in line) and len(line) <= MAX_LINE:
-            parts = _FOR_TERMINALS.sub(b"", line).split(b"\r")
-            for part in parts:
-                found += self._printed(part, is_finished)
-        found = found or self._printed(line, is_finished)
-        if found:
-            self.matched += 1
-            self.last = parts[-1][:_WIDTH]
-            self.unmatched.clear()
-        elif is_finished:
-            self.unmatched.extend(part[:_WIDTH] for part in parts if part.strip())
-        return found
-
-    def _printed(self, line: bytes, is_finished: bool) -> list[Printed]:
+    def _printed(self, line: bytes) -> list[Printed]:
         found = []
-        for pattern in self.patterns if len(line) <= MAX_LINE else ():
-            if self.is_over:
-                break
+        for pattern in self.patterns:
             try:
                 printed = pattern.printed(line)
             except NoValue as error:
-                key, _, _ = str(error).partition(" ")
                 what = f"is not a valid {pattern.line.message}"
-                if is_finished:
-                    self._say_once(f"{what} {key}", f"a line of '{self.service}' {what}: {error}: '{_shown(line)}'")
+                key = f"{what} {str(error).partition(' ')[0]}"
+                self.notes.setdefault(key, f"a line of '{self.service}' {what}: {error}: '{_shown(line)}'")
                 continue
             if printed is not None:
                 found.append(printed)
         return found
 
-    def _say_once(self, key: str, sentence: str) -> None:
-        if key not in self.said:
-            self.said.add(key)
-            self.notes.append(sentence)
-
-    def silence(self, unfinished: bytes = b"") -> str:
-        """What it printed instead of a match since the last one, in words."""
-        since = "since its last match " if self.matched else ""
-        if unfinished.strip() and unfinished != self.unfinished:
-            return f"{since}'{self.service}' printed a line without its end: '{_shown(unfinished)}'"
-        if not self.unmatched:
-            return f"{since}'{self.service}' printed no line"
-        return f"{since}no line of '{self.service}' matched, the nearest is '{_shown(self._nearest())}'"
-
-    def _nearest(self) -> bytes:
-        """The line that is most like one that matched, or like a pattern; of equal ones the last."""
-        likes = [self.last] if self.last else [_GROUP.sub("", p.line.match).encode() for p in self.patterns]
-
-        def likeness(line: bytes) -> float:
-            return max(difflib.SequenceMatcher(None, line, like, autojunk=False).ratio() for like in likes)
-
-        return max(reversed(list(self.unmatched)), key=likeness)
+    def silence(self) -> str:
+        """What it printed instead of a match, in words; empty after one."""
+        said = f"no line of '{self.service}' matched, the last is '{_shown(self.last)}'"
+        return "" if self.has_matched else said if self.last else f"'{self.service}' printed no line"
 
 
 class Send(Protocol):
@@ -273,13 +224,14 @@ class PrintedLines:
         """``send`` sends a frame to the test's services, or on its bus."""
         self._send = send
 
-    async def match(self, service: str, lines: Sequence[bytes], is_finished: bool = True) -> None:
+    async def match(self, service: str, lines: Sequence[bytes]) -> None:
         """Takes lines that a service printed, without their ends, and makes messages of them."""
         own = self.services[service]
-        take = partial(own.take, lines, is_finished)
-        found = [] if own.is_over else await asyncio.get_running_loop().run_in_executor(self._matcher, take)
-        while own.notes:
-            self._note(own.notes.pop(0))
+        found = [] if own.is_over else await asyncio.get_running_loop().run_in_executor(self._matcher, own.take, lines)
+        for key, text in own.notes.items():
+            if text:
+                self._note(text)
+                own.notes[key] = ""
         if self._waiting is None:
             self._send_all(found, None)
         elif len(waiting := self._waiting.setdefault(service, [])) < _MOST_WAITING:
@@ -311,12 +263,9 @@ class PrintedLines:
             each.is_over = True
         self._matcher.shutdown(wait=False, cancel_futures=True)
 
-    def unmatched(self, unfinished: Mapping[str, bytes]) -> tuple[Unmatched, ...]:
-        """Of each service what it printed since its last match; ``unfinished`` are their last lines without an end."""
-        return tuple(
-            Unmatched(name, each.silence(unfinished.get(name, b"")), each.matched == 0)
-            for name, each in self.services.items()
-        )
+    def unmatched(self) -> list[str]:
+        """Of each service of which no line matched what it printed instead, in words."""
+        return [words for each in self.services.values() if (words := each.silence())]
 
 
 def _shown(text: bytes) -> str:

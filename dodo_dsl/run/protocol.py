@@ -202,15 +202,6 @@ class Lost:
     why: str
 
 
-@dataclass(frozen=True)
-class Unmatched:
-    """What a service printed since one of its lines last matched, in words; ``never`` if none did."""
-
-    service: str
-    words: str
-    never: bool
-
-
 Event = Message | VerdictEvent | Malformed | Exited | Unstartable | Lost | GraphFinding
 
 

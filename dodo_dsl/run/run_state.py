@@ -1,7 +1,7 @@
 """The state of one test while it runs: how far it is, and what decides it."""
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from dodo_dsl.application.ros_topics import BRIDGE
@@ -45,7 +45,6 @@ from dodo_dsl.run.protocol import (
     Started,
     Stopped,
     Time,
-    Unmatched,
     Unstartable,
     VerdictEvent,
 )
@@ -96,7 +95,7 @@ class RunState:
     time: Time | None = None
     resources: tuple[ServiceUse, ...] = ()
     _tails: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    _unmatched: tuple[Unmatched, ...] = ()
+    _unmatched: Sequence[str] = ()
     _killed_before: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -244,7 +243,7 @@ class RunState:
             if others := sorted(self.buses - {cid}):
                 details.append(f"the application talks on CID {others[0]}; write x-dodo: {{cid: {others[0]}}}")
         if finding.cause == "silence":
-            details += [each.words for each in self._unmatched]
+            details += self._unmatched
         if finding.result != "error":
             details.append(told_in_words(self.plan.told))
         if finding.result != "passed" and self.is_application(finding.service):
@@ -303,7 +302,7 @@ class RunState:
                 *([ON_EMULATED] if plan.rig and not plan.is_real else []),
                 *self.notes,
                 *self.graph[len(graph) :],
-                *self._printed_notes(finding),
+                *(() if finding.cause == "silence" or finding.result == "error" else self._unmatched),
                 *losses,
                 *answers.notes,
                 *use.notes,
@@ -312,11 +311,6 @@ class RunState:
             response=self.response,
             resources=self.resources,
         )
-
-    def _printed_notes(self, finding: Finding) -> tuple[str, ...]:
-        """Of services whose lines never matched, where that is not said already."""
-        never = (each.words for each in self._unmatched if each.never)
-        return () if finding.cause == "silence" or finding.result == "error" else tuple(never)
 
     def is_application(self, service: str) -> bool:
         """Whether a service is the application's, or was started by it."""

@@ -30,8 +30,8 @@ REPRINT = b"\x12"
 """What a terminal, asked for its unfinished line, answers with ``_REPRINTED``, and gives to no program (termios(3))."""
 _REPRINTED = re.compile(rb"\^R\r?\n")
 
-Match = Callable[[Sequence[bytes], bool], Coroutine[Any, Any, None]]
-"""Takes lines, and whether they are finished; done when their messages are made."""
+Match = Callable[[Sequence[bytes]], Coroutine[Any, Any, None]]
+"""Takes lines; done when their messages are made."""
 
 
 class ServiceOutput:
@@ -75,11 +75,6 @@ class ServiceOutput:
     def release_writer(self) -> None:
         """Closes this process's copy of the writing end, so that the service's end is the output's end."""
         os.close(self.writer)
-
-    @property
-    def unfinished(self) -> bytes:
-        """The start of a line whose end has not come."""
-        return self._rest
 
     def tail(self) -> list[str]:
         return [line.decode("utf-8", "replace")[:_TAIL_WIDTH] for line in self._tail]
@@ -176,13 +171,13 @@ class ServiceOutput:
         if self._matching.done():
             self.done.set()
 
-    def _hand(self, lines: Sequence[bytes], is_finished: bool = True) -> None:
+    def _hand(self, lines: Sequence[bytes]) -> None:
         """Has lines matched; until then, nothing is read."""
         if self._match is None or not lines:
             return
         if self._reader >= 0:
             asyncio.get_running_loop().remove_reader(self._reader)
-        self._matching = asyncio.ensure_future(self._match(lines, is_finished))
+        self._matching = asyncio.ensure_future(self._match(lines))
         self._matching.add_done_callback(self._read_on)
 
     def _read_on(self, _: object) -> None:
@@ -194,7 +189,7 @@ class ServiceOutput:
             asyncio.get_running_loop().add_reader(self._reader, self._read)
 
     async def read_empty(self) -> bool:
-        """Has all matched that was printed until now, and a line without its end, as its program rests.
+        """Has all matched that was printed until now, as its program rests.
 
         Whether so much came that the program may only wait for room in the terminal. Raises TimeoutError where another
         terminal says nothing.
@@ -204,9 +199,6 @@ class ServiceOutput:
         while await self._is_matched() and self.type_in is None and self._read_bytes < _ENOUGH and self._read():
             pass
         is_full, self._read_bytes = self._read_bytes >= _FULL, 0
-        if await self._is_matched() and self._rest and not (is_full or self._skipping):
-            self._hand([self._rest], is_finished=False)
-            await self._is_matched()
         return is_full
 
     async def _is_matched(self) -> bool:

@@ -18,7 +18,7 @@ from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import PrintedLines, Send
-from dodo_dsl.run.protocol import Event, Exited, GraphFinding, Noted, Rested, Unmatched, Unstartable
+from dodo_dsl.run.protocol import Event, Exited, GraphFinding, Noted, Rested, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.service_protocol import Reports
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off, optional
@@ -259,5 +259,5 @@ class Backend:
             lines += each
         return lines
 
-    def unmatched(self) -> tuple[Unmatched, ...]:
-        return self._watched.lines.unmatched({n: out.unfinished for n, out in self._watched.outputs.items()})
+    def unmatched(self) -> list[str]:
+        return self._watched.lines.unmatched()

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from dodo_dsl.plan.model import Application, ApplicationService, Lockstep, Plan, PlannedService
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
-from dodo_dsl.run.protocol import BackendError, Event, Exited, Ready, Unmatched, VerdictEvent
+from dodo_dsl.run.protocol import BackendError, Event, Exited, Ready, VerdictEvent
 from dodo_dsl.run.sides import Backend
 
 T = TypeVar("T")
@@ -93,7 +93,7 @@ class ScriptedBackend:
     """What was used at a time of the loop."""
     listens: Mapping[str, float] | None = None
     """When services of the application join the bus, by the loop's time; None where that cannot be seen."""
-    printed: tuple[Unmatched, ...] = ()
+    printed: tuple[str, ...] = ()
     by_answers: bool = True
 
     def __post_init__(self) -> None:
@@ -133,7 +133,7 @@ class ScriptedBackend:
             raise self.close_problem
         return ["look inside"] if keep else []
 
-    def unmatched(self) -> tuple[Unmatched, ...]:
+    def unmatched(self) -> tuple[str, ...]:
         return self.printed
 
     def tail(self, service: str) -> list[str]:

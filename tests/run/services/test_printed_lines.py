@@ -43,10 +43,10 @@ class Desk:
         self.lines = PrintedLines(plan, folder, self.said.append)
         self.lines.connect(lambda frame, to=(): self.sent.append(decode_frame(frame)))
 
-    def print(self, *lines: bytes, is_finished: bool = True) -> list[tuple[int, int, dict[str, object]]]:
+    def print(self, *lines: bytes) -> list[tuple[int, int, dict[str, object]]]:
         """Sample time, sender stamp and fields of what lines made at once."""
         del self.sent[:]
-        asyncio.run(self.lines.match("app", lines, is_finished))
+        asyncio.run(self.lines.match("app", lines))
         return self.messages_sent()
 
     def messages_sent(self) -> list[tuple[int, int, dict[str, object]]]:
@@ -60,10 +60,6 @@ class Desk:
         assert fields(self.messages, read) == {"goesOn": False}
         assert {each.sent for each in self.sent} <= {now}  # so that recordings are equal
         return self.messages_sent()
-
-    def silence(self, unfinished: bytes = b"") -> str:
-        (found,) = self.lines.unmatched({"app": unfinished})
-        return found.words
 
 
 def fields(messages: MessageSet, envelope: Envelope) -> dict[str, object]:
@@ -112,9 +108,6 @@ def test_lines_for_a_terminal_are_the_messages_of_plain_ones(desk: Desk) -> None
         bar = chosen.choice((b"", b"\r", b"10 %\r20 %\x1b[K\r", b"\x1b[31m99\x1b[m\r"))
         assert len(plain) == 1
         assert desk.print(bar + coloured) == plain
-    assert desk.silence() == "since its last match 'app' printed no line"
-    desk.print(b"\x1b[1mgroup_0X;\x1b[m")
-    assert desk.silence() == "since its last match no line of 'app' matched, the nearest is 'group_0X;'"
 
 
 def test_one_line_may_be_several_messages(tmp_path: Path) -> None:
@@ -194,16 +187,6 @@ def test_lines_wait_for_the_step_in_which_their_program_rests(tmp_path: Path, ta
     assert desk.rest(300) == []
 
 
-def test_a_line_without_its_end_counts_once_where_its_program_rests(desk: Desk) -> None:
-    """As one that prints the newline before each line; what does not match yet is neither log nor wrong."""
-    assert len(desk.print(b"group_06;1;0.5", is_finished=False)) == 1
-    assert desk.print(b"group_06;1;0.5", is_finished=False) == []
-    assert desk.silence(b"group_06;1;0.5") == "since its last match 'app' printed no line"
-    assert desk.print(b"group_06;1;0.5\r") == []
-    assert desk.print(b"group_06;2;-", is_finished=False) == []
-    assert (len(desk.print(b"group_06;2;-0.5")), desk.said) == (1, [])
-
-
 @pytest.mark.parametrize(
     ("inputs", "heard"), [((), True), ((f"{STEERING}/0",), True), (("opendlv.proxy.PedalPositionRequest",), False)]
 )
@@ -243,17 +226,12 @@ def test_what_does_not_convert_is_said_once_and_is_no_message(desk: Desk) -> Non
 
 
 def test_silence_in_words(desk: Desk) -> None:
-    assert desk.silence() == "'app' printed no line"
-    desk.print(b"ready", b"group_06,1584542902573412,0.04\x1b", b"bye")
-    nearest = "group_06,1584542902573412,0.04\N{REPLACEMENT CHARACTER}"
-    assert desk.silence() == f"no line of 'app' matched, the nearest is '{nearest}'"
-    assert desk.silence(b"group_06;1;0.5").endswith("'app' printed a line without its end: 'group_06;1;0.5'")
-    assert [each.never for each in desk.lines.unmatched({})] == [True]
-    desk.print(b"group_06;1;0.5")
-    assert desk.silence() == "since its last match 'app' printed no line"
-    desk.print(b"group_06;nan;0.5", b"done")
-    assert desk.silence() == "since its last match no line of 'app' matched, the nearest is 'group_06;nan;0.5'"
-    assert [each.never for each in desk.lines.unmatched({})] == [False]
+    assert desk.lines.unmatched() == ["'app' printed no line"]
+    desk.print(b"ready", b"group_06,1584542902573412,0.04\a", b"")
+    last = "group_06,1584542902573412,0.04\N{REPLACEMENT CHARACTER}"
+    assert desk.lines.unmatched() == [f"no line of 'app' matched, the last is '{last}'"]
+    desk.print(b"group_06;1;0.5", b"done")
+    assert desk.lines.unmatched() == []
 
 
 def test_a_large_pattern_is_refused_as_the_time_of_a_line_grows_with_it_too() -> None:

@@ -82,22 +82,22 @@ def test_a_service_that_keeps_its_output_open_is_not_waited_for(tmp_path: Path) 
 
 def test_a_terminal_is_read_empty_where_its_program_rests(tmp_path: Path) -> None:
     """And says whether so much came that the program may only have waited for room."""
-    matched: list[tuple[list[bytes], bool]] = []
+    matched: list[bytes] = []
 
-    async def take(lines: Sequence[bytes], is_finished: bool) -> None:
+    async def take(lines: Sequence[bytes]) -> None:
         await asyncio.sleep(0.01)
-        matched.append(([*lines], is_finished))
+        matched.extend(lines)
 
     async def scene() -> None:
         output = ServiceOutput(tmp_path / "app.log", lambda _: False, terminal=True, match=take)
         os.write(output.writer, b"a\nb\nunfin")
         assert not await output.read_empty()
-        assert matched == [([b"a", b"b"], True), ([b"unfin"], False)]
+        assert matched == [b"a", b"b"]
         os.write(output.writer, b"ished\n" + b"x" * 4000 + b"\n")
         await asyncio.sleep(0.05)
         os.write(output.writer, b"y" * 100 + b"\n")
         assert await output.read_empty()
-        assert [len(line) for lines, _ in matched[2:] for line in lines] == [10, 4000, 100]
+        assert [len(line) for line in matched[2:]] == [10, 4000, 100]
         output.release_writer()
         await asyncio.wait_for(output.done.wait(), 10)
         assert not await output.read_empty()
@@ -110,7 +110,7 @@ def test_another_terminal_says_what_was_printed_until_now(tmp_path: Path) -> Non
     """By what it echoes, which its program never gets; one that echoes nothing is given up."""
     lines: list[bytes] = []
 
-    async def take(found: Sequence[bytes], _: bool) -> None:
+    async def take(found: Sequence[bytes]) -> None:
         lines.extend(found)
 
     async def scene() -> None:
@@ -129,7 +129,7 @@ def test_another_terminal_says_what_was_printed_until_now(tmp_path: Path) -> Non
         for number in range(20):
             os.write(inner, b"line %d\nnot " % number)
             await output.read_empty()
-            assert lines[-2:] == [b"line %d" % number if number == 0 else b"not line %d" % number, b"not "]
+            assert lines[-1] == (b"not " * bool(number) + b"line %d" % number)
         os.set_blocking(inner, False)
         with pytest.raises(BlockingIOError):
             os.read(inner, 1)
