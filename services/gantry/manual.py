@@ -1,10 +1,8 @@
 """Manual control of the rig: ``python -m services.gantry.manual --serial=PORT ACTION``, which prints one JSON object.
 
-Where standard input is a pipe, its end stops the rig, too: the command that moved it has died.
-Actions: ``status``, ``home``, ``goto X Y YAW`` (m, m, degrees), ``calibrate`` and ``check``. The rig is stopped
-at every exit, unless a fault has stopped it: that is kept to be seen, and ``calibrate`` acknowledges it. Exit codes:
-0 done, 1 the rig cannot (``error`` says why; of ``check``, ``reason`` says why it is not fit), 2 usage.
-A rig is fit for a test when its line answers reliably and in time, and its home has not moved.
+Actions: ``status``, ``home``, ``goto X Y YAW`` (m, m, degrees), ``calibrate`` and ``check``. The rig is stopped at
+every exit, also at the end of a pipe as standard input, unless a fault has stopped it: ``calibrate`` acknowledges that.
+Exit codes: 0 done, 1 the rig cannot (``error`` says why; of ``check``, ``reason`` says why it is not fit), 2 usage.
 """
 
 import json
@@ -12,7 +10,7 @@ import math
 import statistics
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -23,49 +21,29 @@ from services.base import Flags
 from services.base.flags import load_manifest, parse
 from services.base.process import interruptible, stop_without_master
 from services.gantry import memory, start
-from services.gantry.emulator import EmulatedRig
-from services.gantry.link import REQUEST_STATE, Link, RigError, checked
+from services.gantry.link import REQUEST_STATE, Link, RigError
 from services.gantry.memory import conversion_of, kept_limits, true_box
 from services.gantry.motion import Conversion, MotionLimits
-from services.gantry.protocol import Position, Word
+from services.gantry.protocol import Position
 from services.gantry.rig_table import Status
-from services.gantry.service import EMULATED, describe, place
+from services.gantry.service import describe, opened, place
 
 ROUNDS = 20
 ANSWER = 0.25
 """s within which position and status have to come, each time."""
 LATENCY = 0.05
 """s that the median answer may take; the firmware needs 5 ms and the line as much."""
-DISTANCES = {"x": 0.04, "y": 0.04, "yaw": 0.15}
-"""How far from home (m, m, rad) each axis looks for home, and from twice as far."""
-CIRCLE_DISTANCES = {"x": 0.08, "y": 0.08, "yaw": math.radians(14.4)}
-"""The same where the yaw turns without end: farther, as from index to index it takes longer than the others at home.
-Motors jump to a pole first; eight full steps are the same between poles."""
-SPEEDS = {"x": 0.1, "y": 0.1, "yaw": 0.35}
-"""Of homing (m/s, m/s, rad/s), as firmware/gantry/protocol.h has them."""
-REPEATS = {"x": 0.005, "y": 0.005, "yaw": math.radians(2.5)}
-"""By how much the switch may have moved (m, m, rad)."""
 DECIMAL = 1e-4
 INDEX = -math.pi
 """rad, the heading at the index of a yaw that turns without end, by its firmware."""
 TRIES = 3
 """Of which the best counts, as a busy machine sometimes measures late."""
-BESIDE = 0.5
-"""rad beside the index, from where a turn begins and ends."""
-_POLL = 0.005
 
 
 def find_home(limits: MotionLimits, conversion: Conversion) -> Position:
     """The true place at the switches, as far as the limits reach, that the line's decimals do not round outside."""
-    return replace(limits.low, yaw=_index(conversion) if _endless(limits) else limits.low.yaw + DECIMAL)
-
-
-def _index(conversion: Conversion) -> float:
-    return conversion.to_true(Position(0.0, 0.0, INDEX)).yaw
-
-
-def _endless(limits: MotionLimits) -> bool:
-    return math.isinf(limits.low.yaw)
+    index = conversion.to_true(Position(0.0, 0.0, INDEX)).yaw
+    return replace(limits.low, yaw=index if math.isinf(limits.low.yaw) else limits.low.yaw + DECIMAL)
 
 
 def read_state(link: Link) -> tuple[Position | None, Status]:
@@ -77,25 +55,14 @@ def read_state(link: Link) -> tuple[Position | None, Status]:
     raise RigError(f"the rig at {link.name} does not report its position")
 
 
-def run_checks(link: Link, limits: MotionLimits, kept: Mapping[str, float], patience: float) -> None:
-    """The rig moves, and ends at home; its memory gets the limits ``kept``. Raises RigError, why it is unfit.
+def run_checks(link: Link, kept: Mapping[str, float], patience: float) -> None:
+    """The rig finds its home, its memory gets the limits ``kept``, and it answers in time.
 
-    A rig that cannot move, or still reports an old fault, is not fit.
+    Raises RigError, why it is unfit, also for a rig that still reports an old fault.
     """
-    status = start.find(link)
-    start.settle(link, status)
+    start.settle(link, start.find(link))
     memory.agree(link, kept, write=True)
     start.calibrate(link, patience)
-    _check_answers(link)
-    for axis, unit, scale in (("x", "mm", 1000.0), ("y", "mm", 1000.0), ("yaw", "deg", math.degrees(1))):
-        off = min(_differences(link, limits, axis, patience))
-        if off > REPEATS[axis]:
-            raise RigError(f"homing {axis} is {scale * off:.3g} {unit}, expected at most {scale * REPEATS[axis]:g}")
-    if _endless(limits):
-        _turn_around(link, limits, patience)
-
-
-def _check_answers(link: Link) -> None:
     missed, latency = min(_answers(link) for _ in range(TRIES))
     if missed:
         raise RigError(f"answers is {ROUNDS - missed} of {ROUNDS}, expected at least {ROUNDS}")
@@ -112,33 +79,6 @@ def _answers(link: Link) -> tuple[int, float]:
         if at is not None and status is not None:
             took.append(time.monotonic() - begin)
     return ROUNDS - len(took), statistics.median(took) if took else ANSWER
-
-
-def _turn_around(link: Link, limits: MotionLimits, patience: float) -> None:
-    """Turn once around, past the index, and back past it: the firmware notices where it is not. Raises RigError."""
-    at = find_home(limits, link.conversion)
-    ways = (1, Word.GOTO), (-1, Word.GOTOLEFT), (1, Word.GOTOLEFT), (-1, Word.GOTORIGHT)
-    for side, word in ways:
-        start.go(link, replace(at, yaw=at.yaw + side * BESIDE), patience, word)
-
-
-def _differences(link: Link, limits: MotionLimits, axis: str, patience: float) -> Iterator[float]:
-    """By how much an axis' switch seems to have moved the second time (m or rad), until that is little enough.
-
-    Homes from two places: the times differ by the distance between them, unless home has moved. Positions mean nothing
-    while homing, and agree with themselves afterwards whatever steps were lost.
-    """
-    low: float = _index(link.conversion) if axis == "yaw" and _endless(limits) else getattr(limits.low, axis)
-    high: float = getattr(limits.high, axis)
-    distance = min((CIRCLE_DISTANCES if _endless(limits) else DISTANCES)[axis], (high - low) / 2)
-    for _ in range(TRIES):
-        took = []
-        for times in (1, 2):
-            start.go(link, replace(find_home(limits, link.conversion), **{axis: low + times * distance}), patience)
-            took.append(start.calibrate(link, patience, _POLL))
-        yield (off := abs((took[1] - took[0]) * SPEEDS[axis] * link.conversion.scale[axis] - distance))
-        if off <= REPEATS[axis]:
-            return
 
 
 ACTIONS = {"status": 0, "home": 0, "goto": 3, "calibrate": 0, "check": 0}
@@ -214,13 +154,10 @@ def _done(
     patience = flags["patience"]
     with ExitStack() as resources, interruptible():
         stop_without_master()
-        emulated = resources.enter_context(EmulatedRig(kind=flags["kind"])) if flags["serial"] == EMULATED else None
-        target = checked(emulated.port if emulated else flags["serial"])
-        link = Link(target, conversion=conversion_of(flags))
-        resources.callback(link.close)
+        link, emulated = opened(flags, resources)
         if action == "check":
             try:
-                run_checks(link, limits, kept, patience)
+                run_checks(link, kept, patience)
             except RigError as error:
                 return {"ok": False, "reason": str(error)}, BROKEN
             return {"ok": True, **_where(link, limits)}, DONE

@@ -32,8 +32,6 @@ class Word(StrEnum):
     LIMITS = "LIMITS"
     SETLIMITS = "SETLIMITS"
     FORGET = "FORGET"
-    GOTOLEFT = "GOTOLEFT"
-    GOTORIGHT = "GOTORIGHT"
 
 
 SENTENCES = {

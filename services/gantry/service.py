@@ -3,11 +3,12 @@
 import math
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from typing import Any
 
 from google.protobuf.message import Message
 
-from services.base import Context, Output, Service, period_of
+from services.base import Context, Flags, Output, Service, period_of
 from services.base.process import interruptible
 from services.gantry import memory, start
 from services.gantry.emulator import EmulatedRig
@@ -166,16 +167,24 @@ def describe(status: Status) -> str:
     return f"the rig {SENTENCES[status]}" if status in SENTENCES else f"the rig is {status.name.lower()}"
 
 
+def opened(flags: Flags, resources: ExitStack) -> tuple[Link, EmulatedRig | None]:
+    """The line to the rig, which is stopped when it is closed, and the emulated rig if that is one.
+
+    Raises PortError and RigError.
+    """
+    emulated = resources.enter_context(EmulatedRig(kind=flags["kind"])) if flags["serial"] == EMULATED else None
+    link = Link(checked(emulated.port if emulated else flags["serial"]), conversion=conversion_of(flags))
+    resources.callback(link.close)
+    return link, emulated
+
+
 def build(context: Context) -> Service:
     """The service from its flags: it is ready when the rig is at its start, and stops the rig at every exit."""
     flags = context.flags
-    emulated = context.resources.enter_context(EmulatedRig(kind=flags["kind"])) if flags["serial"] == EMULATED else None
-    target = checked(emulated.port if emulated else flags["serial"])
     goal = Position(flags["x"], flags["y"], math.radians(flags["yaw"]))
     if not motion_limits(flags).holds(goal):
         raise PortError(f"the start is out of the rig's ranges: {place(goal)}")
-    link = Link(target, conversion=conversion_of(flags))
-    context.resources.callback(link.close)
+    link, emulated = opened(flags, context.resources)
     with interruptible():
         status = start.find(link)
         start.settle(link, status)

@@ -50,8 +50,8 @@ def give(link: Link, word: Word, *arguments: float) -> Status | None:
     return answers.status
 
 
-def calibrate(link: Link, patience: float, poll: float = POLL) -> float:
-    """Let the rig find its home; how long that took, in s. Raises RigError when it has not after ``patience`` s."""
+def calibrate(link: Link, patience: float) -> None:
+    """Let the rig find its home; raises RigError when it has not after ``patience`` s."""
     begin = time.monotonic()
     homing = give(link, Word.CALIBRATE) == Status.HOMING
 
@@ -62,17 +62,13 @@ def calibrate(link: Link, patience: float, poll: float = POLL) -> float:
             raise RigError(f"the rig at {link.name} does not begin to find its home")
         return homing and status == Status.IDLE
 
-    _wait(link, patience, done, "has not found its home", command(Word.STATUS), poll)
-    return time.monotonic() - begin
+    _wait(link, patience, done, "has not found its home", command(Word.STATUS))
 
 
-def go(link: Link, goal: Position, patience: float, word: Word = Word.GOTO) -> None:
-    """Drive the rig to a true place; raises RigError when it is not there after ``patience`` s.
-
-    ``word`` is GOTOLEFT or GOTORIGHT for the direction that a circle turns.
-    """
+def go(link: Link, goal: Position, patience: float) -> None:
+    """Drive the rig to a true place; raises RigError when it is not there after ``patience`` s."""
     told = link.conversion.to_firmware(goal)
-    give(link, word, told.x, told.y, told.yaw)
+    give(link, Word.GOTO, told.x, told.y, told.yaw)
     place = f"x = {goal.x:g} m, y = {goal.y:g} m, yaw = {math.degrees(goal.yaw):g} degrees"
     _wait(link, patience, lambda at, status: status == Status.IDLE and near(at, goal), f"has not reached {place}")
 
@@ -90,7 +86,6 @@ def _wait(
     done: Callable[[Position | None, Status | None], bool],
     what: str,
     request: bytes = REQUEST_STATE,
-    poll: float = POLL,
 ) -> None:
     end = time.monotonic() + patience
     while time.monotonic() < end:
@@ -99,5 +94,5 @@ def _wait(
             return
         if status in SENTENCES:
             raise RigError(trouble(link, status))
-        time.sleep(poll)
+        time.sleep(POLL)
     raise RigError(f"the rig at {link.name} {what} after {patience:g} s")

@@ -43,19 +43,14 @@ class FakeRig:
         """Where they are from."""
         self.forgetful = False
         """Whether its memory takes no limits."""
-        self.lost_index = False
-        """Whether it finds no index when it turns around."""
         self.calibrated = True
         self.silent = False
         self.homes_slowly = False
-        self.lost = 0.0
-        """m of steps lost on each way home: where its switch x seems to be moves by as much."""
         self.noise = b""
         self.chopped = False
         self.received: list[tuple[str, tuple[float, ...]]] = []
         self._goal: list[float] | None = None
         self._home_at = 0.0
-        self._homed = 0
         self._last_run = 0.0
         self._rest = b""
         self._master: int | None = None
@@ -136,9 +131,8 @@ class FakeRig:
             self.memory, self.source = list(arguments), 1
         elif word == "FORGET":
             self.calibrated = False
-        elif word in ("GOTO", "GOTOLEFT", "GOTORIGHT"):
+        elif word == "GOTO":
             self._acknowledge()
-            self.status = 4 if self.lost_index and word != "GOTO" else self.status
             self._goal = list(arguments)
         elif word == "CALIBRATE":
             self._acknowledge()
@@ -149,8 +143,6 @@ class FakeRig:
             self._answer(str(self._said()))
 
     def _refusal(self, word: str, arguments: tuple[float, ...]) -> int | None:
-        if word in ("GOTOLEFT", "GOTORIGHT") and not self.turn:
-            return Error.UNKNOWN
         if word == "SETLIMITS" and self.calibrated:
             return Error.BUSY
         homing = time.monotonic() < self._home_at
@@ -177,9 +169,7 @@ class FakeRig:
 
     def _home(self) -> None:
         ways = [abs(a - h) for a, h in zip(self.at, HOME, strict=True)]
-        self._homed += 1
-        lost = self.lost * self._homed
-        took = max(way / speed for way, speed in zip([ways[0] + lost, *ways[1:]], HOMING, strict=True))
+        took = max(way / speed for way, speed in zip(ways, HOMING, strict=True))
         self._home_at = time.monotonic() + max(LEAST_HOMING, took * self.homes_slowly)
         self.calibrated, self.at = True, list(HOME)
 

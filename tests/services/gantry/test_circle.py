@@ -1,4 +1,4 @@
-"""A rig whose yaw turns without end: its firmware, its headings, its limits and its health check."""
+"""A rig whose yaw turns without end: its firmware, its headings and its limits."""
 
 import math
 import sys
@@ -9,8 +9,7 @@ import pytest
 
 from services.gantry import manual, memory, start
 from services.gantry.link import Link, RigError
-from services.gantry.manual import INDEX, find_home, run_checks
-from services.gantry.memory import wanted
+from services.gantry.manual import INDEX, find_home
 from services.gantry.motion import Conversion, MotionLimits, Shaper, Velocity, box
 from services.gantry.protocol import Position
 from tests.services.gantry.fake_rig import FakeRig
@@ -20,9 +19,7 @@ LIMITS = MotionLimits(low=LOW, high=HIGH)
 
 
 @pytest.fixture
-def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[FakeRig, Link]]:
-    monkeypatch.setattr(manual, "ROUNDS", 3)
-    monkeypatch.setattr(manual, "REPEATS", dict.fromkeys(("x", "y", "yaw"), 1.0))
+def line(tmp_path: Path) -> Iterator[tuple[FakeRig, Link]]:
     with FakeRig(tmp_path / "rig") as rig:
         rig.turn = True
         link = Link(str(rig.path), conversion=Conversion(circle=True))
@@ -64,22 +61,6 @@ def test_headings_have_no_edge_and_places_do() -> None:
 def test_a_heading_may_have_the_name_of_another_turn() -> None:
     assert start.near(Position(0, 0, -3.141), Position(0, 0, 3.141))
     assert not start.near(Position(0, 0, -3.1), Position(0, 0, 3.1))
-
-
-@pytest.mark.thorough
-def test_the_health_check_turns_around_and_passes_the_index_to_either_side(line: tuple[FakeRig, Link]) -> None:
-    rig, link = line
-    run_checks(link, LIMITS, wanted(None, Conversion(circle=True)), 5.0)
-    words = [word for word, _ in rig.received if word in ("GOTOLEFT", "GOTORIGHT")]
-    assert words == ["GOTOLEFT", "GOTOLEFT", "GOTORIGHT"]
-
-
-@pytest.mark.thorough
-def test_a_rig_that_loses_its_index_on_the_way_round_is_not_fit(line: tuple[FakeRig, Link]) -> None:
-    rig, link = line
-    rig.lost_index = True
-    with pytest.raises(RigError, match="lost steps"):
-        run_checks(link, LIMITS, wanted(None, Conversion(circle=True)), 5.0)
 
 
 def test_by_hand_any_heading_is_reached(line: tuple[FakeRig, Link], capsys: pytest.CaptureFixture[str]) -> None:

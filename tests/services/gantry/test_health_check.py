@@ -16,7 +16,6 @@ from tests.services.gantry.fake_rig import FakeRig
 def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> "tuple[FakeRig, Link]":
     """A rig whose home is found at once, wherever it is."""
     monkeypatch.setattr(manual, "ROUNDS", 3)
-    monkeypatch.setattr(manual, "TRIES", 1)
     with FakeRig(tmp_path / "rig") as rig:
         link = Link(str(rig.path))
         yield rig, link
@@ -43,5 +42,5 @@ def test_an_old_fault_fails_and_is_not_erased(line: "tuple[FakeRig, Link]") -> N
     rig, link = line
     rig.status = int(Status.STALL)
     with pytest.raises(RigError, match="a motor stalled"):
-        run_checks(link, MotionLimits(), wanted(None, Conversion()), 5.0)
+        run_checks(link, wanted(None, Conversion()), 5.0)
     assert rig.status == Status.STALL

@@ -45,11 +45,9 @@ def test_uncalibrated(rig: FakeRig) -> None:
     assert manual(rig, "calibrate")["status"] == 0
 
 
-@pytest.mark.realtime
-def test_check_of_a_good_rig_and_of_one_that_loses_steps(rig: FakeRig) -> None:
-    rig.homes_slowly, rig.at = True, [-0.85, -0.65, -2.5]
+def test_check_of_a_good_rig_and_of_one_that_answers_late(rig: FakeRig, monkeypatch: pytest.MonkeyPatch) -> None:
+    rig.at = [-0.85, -0.65, -2.5]
     result = manual(rig, "check")
     assert result["ok"] and result["word"] == "idle"
-    rig.homes_slowly, rig.lost = False, 0.01
-    result = manual(rig, "check", code=1)
-    assert result["reason"].startswith("homing x is ")
+    monkeypatch.setattr("services.gantry.manual.LATENCY", 0.0)
+    assert manual(rig, "check", code=1)["reason"].startswith("latency is ")
