@@ -1,9 +1,7 @@
 """The clock of a service in lockstep: the clock service alone advances the time of the test.
 
 What a service consumes comes inside the step message and nowhere else, and what it produces goes back inside the
-answer, so that no lost or late datagram can change a result (``docs/explanation/lockstep.md``). A picture in shared
-memory is announced when all its readers wait and the clock says so. A service that observes the bus gets each message
-once, in the step that it belongs to.
+answer, so that no lost or late datagram can change a result (``docs/explanation/lockstep.md``).
 
 A recording has marks of the steps. The messages of the test's services are in it as they were sent, ``received`` at 0,
 behind the ``dodo.RecordedStep`` in which services got it. That holds the application's messages as the clock passed
@@ -17,7 +15,7 @@ from contextlib import contextmanager
 from fractions import Fraction
 from functools import partial
 from itertools import groupby, islice
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from dodo_dsl.opendlv.channel import About, Done, Show, Step
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
@@ -31,6 +29,7 @@ from services.base.clock_link import ClockClient
 
 if TYPE_CHECKING:
     from services.base.loop import Loop
+    from services.base.recorded_clock import RecordedSteps
 
 _POLL_S = 0.0002
 _LONGEST_POLL_S = 0.002
@@ -62,7 +61,9 @@ class AnnouncedMemory(SharedMemory):
         self.is_new = True
 
     def announce(self) -> None:
-        """Show the picture and notify the readers."""
+        """Show the picture, if there is a new one, and notify the readers."""
+        if not self.is_new:
+            return
         self.is_new = False
         with super().lock():
             self._shown[:] = self.buffer
@@ -72,39 +73,6 @@ class AnnouncedMemory(SharedMemory):
     def close(self) -> None:
         self._shown = memoryview(b"")
         super().close()
-
-
-class Announcer:
-    """All the memories of a service; ``readers`` are expected to wait for pictures of all of them together."""
-
-    def __init__(self, readers: int) -> None:
-        self._readers = readers
-        self.memories: list[AnnouncedMemory] = []
-
-    @property
-    def new(self) -> list[AnnouncedMemory]:
-        """Those that hold a picture that is not announced yet."""
-        return [memory for memory in self.memories if memory.is_new]
-
-    @property
-    def sampled(self) -> int:
-        """When the newest picture was sampled."""
-        return max((memory.sampled for memory in self.memories), default=0)
-
-    @property
-    def is_awaited(self) -> bool:
-        """Whether all readers wait."""
-        return sum(memory.readers_waiting() for memory in self.memories) >= self._readers
-
-    def await_readers(self, stopped: Callable[[], bool]) -> bool:
-        """Wait until all readers wait, so that none misses a picture or reads one twice; False when ``stopped``."""
-        look_until(lambda: self.is_awaited or stopped(), _POLL_S, _LONGEST_POLL_S)
-        return self.is_awaited
-
-    def announce(self) -> None:
-        """Announce all new pictures."""
-        for memory in self.new:
-            memory.announce()
 
 
 EPOCH = 1_700_000_000_000_000
@@ -192,40 +160,23 @@ class StepMarks:
         return Envelope(self._id, self._messages.encode(message), self._last, 0, self._last, 0)
 
 
-__all__ = ["EPOCH", "LockstepClock"]
-
-
-class StepSource(Protocol):
-    """Where commands come from and answers go, as ClockClient implements it; ``is_over`` when no more will come."""
-
-    is_over: bool
-
-    def next(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | Show | None: ...
-    def answer(self, done: Done) -> None: ...
-    def close(self) -> None: ...
-
-
 class LockstepClock(Clock):
-    """Test time in the clock service's steps; ``name`` is the service's name in the test.
+    """Test time in the clock service's steps, or a recording's; ``name`` is the service's name in the test.
 
-    Steps come from ``source``, by default from the clock service.
+    ``readers`` are expected to wait for pictures of all its memories together.
     """
 
     relays = True
 
     def __init__(
-        self,
-        session: Session,
-        name: str,
-        readers: int,
-        source: StepSource | None = None,
+        self, session: Session, name: str, readers: int, source: "ClockClient | RecordedSteps | None" = None
     ) -> None:
-        self._name = name
-        self._source: StepSource = source or ClockClient(session, name)
+        self._name, self._readers = name, readers
+        self._source = source or ClockClient(session, name)
         self._now = EPOCH - 1
         self._open = False
         self._sent: list[Envelope] = []
-        self._announcer = Announcer(readers)
+        self._memories: list[AnnouncedMemory] = []
         self._observer = Observer(StepMarks(session.messages).of)
         self._next = 0
         self._address = session.address
@@ -236,12 +187,16 @@ class LockstepClock(Clock):
 
     @property
     def has_new_picture(self) -> bool:
-        return bool(self._announcer.new)
+        return any(memory.is_new for memory in self._memories)
+
+    def _is_awaited(self) -> bool:
+        """Whether all readers wait, so that none misses a picture or reads one twice."""
+        return sum(memory.readers_waiting() for memory in self._memories) >= self._readers
 
     def steps(self, period: Fraction | int, inbox: "Loop", stopped: Callable[[], bool]) -> Iterator[int]:
         """As ``Clock.steps``; messages are delivered in the order of their sample times."""
         consumes = [] if inbox.observes else sorted(inbox.consumes)
-        self._about = About(self._address, len(self._announcer.memories), consumes)
+        self._about = About(self._address, len(self._memories), consumes)
         yield from self._steps(period, inbox, stopped)
         if inbox.observes:
             for envelope in islice(iter(partial(inbox.receive, 0.0), None), _MOST_LAST):
@@ -276,10 +231,13 @@ class LockstepClock(Clock):
 
     def _show(self, command: Show, stopped: Callable[[], bool]) -> bool:
         """False when ``stopped`` before."""
-        if command.awaits and not self._announcer.await_readers(stopped):
-            return False
+        if command.awaits:
+            look_until(lambda: self._is_awaited() or stopped(), _POLL_S, _LONGEST_POLL_S)
+            if not self._is_awaited():
+                return False
         if command.announces:
-            self._announcer.announce()
+            for memory in self._memories:
+                memory.announce()
         self._answer()
         return True
 
@@ -291,17 +249,14 @@ class LockstepClock(Clock):
         self._now = now
 
     def sent(self, envelope: Envelope) -> None:
-        """The service has sent this message."""
         self._sent.append(envelope)
 
     def expect(self, time: int) -> None:
-        """The test may go on to this time in one step."""
         self._next = time
 
     def memory(self, name: str, size: int) -> SharedMemory:
-        """New shared memory whose pictures are announced once, when their readers wait."""
         memory = AnnouncedMemory.create(name, size)
-        self._announcer.memories.append(memory)
+        self._memories.append(memory)
         return memory
 
     def close(self, stopped: Callable[[], bool]) -> None:
@@ -312,7 +267,7 @@ class LockstepClock(Clock):
         if self._open:
             self._answer(ended=True)
         self._source.close()
-        if self._announcer.memories:
+        if self._memories:
             look_until(stopped)
 
     def _command(self, inbox: "Loop", stopped: Callable[[], bool]) -> Step | Show | None:
@@ -324,11 +279,12 @@ class LockstepClock(Clock):
         return None
 
     def _answer(self, ended: bool = False) -> None:
-        sent, about, announcer = self._sent, self._about, self._announcer
+        sent, about, memories = self._sent, self._about, self._memories
         self._sent, self._about, self._open = [], None, False
-        pictures = len(announcer.new)
-        awaited = bool(announcer.memories) and announcer.is_awaited
-        self._source.answer(Done(self._name, sent, pictures, announcer.sampled, self._next, ended, about, awaited))
+        pictures = sum(memory.is_new for memory in memories)
+        sampled = max((memory.sampled for memory in memories), default=0)
+        awaited = bool(memories) and self._is_awaited()
+        self._source.answer(Done(self._name, sent, pictures, sampled, self._next, ended, about, awaited))
 
 
 def in_order(messages: Iterable[Envelope]) -> deque[tuple[int, Envelope]]:

@@ -1,15 +1,11 @@
-"""The one loop of all services: deliver, update, send, until there is a verdict, an end or a signal.
-
-It counts how late a service is against its schedule in real time, and which sender stamps it heard: a message under
-another stamp than its own is easily taken for silence.
-"""
+"""The one loop of all services: deliver, update, send, until there is a verdict, an end or a signal."""
 
 import functools
 import logging
 import operator
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -63,43 +59,6 @@ class Lateness:
         return {"updates": self._updates, "late": self._late, "worst_s": round(self._worst / MICROSECONDS, 3)}
 
 
-@dataclass
-class HeardStamps:
-    """Counts messages by sender stamp; ``inputs`` are ids and stamps that the service takes, with their names."""
-
-    inputs: Mapping[tuple[int, int | None], str]
-    _heard: Counter[tuple[int, int]] = field(default_factory=Counter)
-
-    def take(self, envelope: Envelope) -> None:
-        """A message of a type that the service takes, whatever its stamp."""
-        self._heard[envelope.data_type, envelope.sender_stamp] += 1
-
-    def strangers(self) -> list[str]:
-        """A sentence for each input that never came, while others of its type did."""
-        return [
-            f"no {name}/{stamp} came, but {others(counts)}"
-            for (id_, stamp), name in self.inputs.items()
-            if stamp is not None and not self._heard[id_, stamp] and (counts := self._others(id_))
-        ]
-
-    def _others(self, id_: int) -> dict[int, int]:
-        """How often each stamp came that no input of a message has."""
-        known: Collection[int | None] = {stamp for other, stamp in self.inputs if other == id_}
-        if None in known:
-            return {}
-        return {stamp: count for (other, stamp), count in self._heard.items() if other == id_ and stamp not in known}
-
-
-def others(counts: Mapping[int, int]) -> str:
-    """``120 with sender stamp 99``, and so on, by stamp."""
-    return " and ".join(f"{count} with sender stamp {stamp}" for stamp, count in sorted(counts.items()))
-
-
-def with_strangers(reason: str, strangers: Iterable[str]) -> str:
-    """A reason with what was heard under other stamps."""
-    return "; ".join([reason, *strangers])
-
-
 TEST_BEGIN = "dodo.TestBegin"
 REPORT_PERIOD = 1_000_000
 
@@ -111,10 +70,8 @@ _warn_once = functools.cache(_log.warning)
 class Loop:
     """Runs a service on a session by a clock; ``sender_stamp`` is that of outputs without one.
 
-    ``name`` is the source in its EndOfInput. The runner hears, once a second at most, how many messages were lost so
-    far, and in real time how many updates ended late since the test began and for how long what is emulated stood
-    still; that a source is at its end; and the service's notes, with messages that came under other sender stamps
-    only, unless a verdict has them. Raises what the model raises, and SessionError.
+    ``name`` is the source in its EndOfInput. Raises what the model raises, SessionError, and ValueError for a period
+    that is none.
     """
 
     name: str
@@ -127,7 +84,8 @@ class Loop:
     ends_input: bool = False
     """Whether the verdict ends the test: the others decide on what came until then."""
     _handlers: dict[int, list[tuple[int | None, Handler, Layout]]] = field(default_factory=dict)
-    _stamps: HeardStamps = field(init=False)
+    _heard: Counter[tuple[int, int]] = field(default_factory=Counter)
+    """Messages by id and sender stamp of the types that the service takes."""
     _unusable: set[tuple[int, int]] = field(default_factory=set)
     _began: int | None = None
     """When the test began, in us."""
@@ -146,7 +104,10 @@ class Loop:
             entry = (None, self.service.not_shown, self.session.messages.layout(NOT_SHOWN))
             self._handlers[ids(NOT_SHOWN)] = [entry]
         self._begin, self._end = ids(TEST_BEGIN), ids(END_OF_INPUT)
-        self._stamps = HeardStamps({(ids(name), stamp): name for name, stamp in self.service.inputs})
+        period = self.service.period
+        if period is not None and (period < 1 or (period % 1 and not isinstance(period, Fraction))):
+            expected = "expected microseconds, 1 or more: period_of(freq) gives them"
+            raise ValueError(f"the period of {type(self.service).__name__} is {period}, {expected}")
         self._lateness = Lateness(self.service.period, self.service.late_after)
         self._world = World.load(self.session.messages)
 
@@ -158,7 +119,7 @@ class Loop:
         try:
             self._run(stopped)
         except UnjudgeableError as error:
-            raise UnjudgeableError(with_strangers(str(error), self._stamps.strangers())) from None
+            raise UnjudgeableError("; ".join([str(error), *self.strangers()])) from None
         self._hear_rest()
         if self.service.finished and self.service.verdict is None:
             tell("end-of-input")
@@ -229,7 +190,7 @@ class Loop:
             return
         self.service.arrived = self.clock.now() if self.clock.relays else envelope.received
         if envelope.data_type in self._handlers:
-            self._stamps.take(envelope)
+            self._heard[envelope.data_type, envelope.sender_stamp] += 1
         if envelope.data_type == self._begin:
             self._began = envelope.sample_time
             if self.members is not None:
@@ -256,12 +217,23 @@ class Loop:
                         self._unusable.add(key)
                         _log.warning("ignored this and all such %s/%d: %s", type(message).__name__, key[1], error)
 
+    def strangers(self) -> list[str]:
+        """A sentence for each input that never came, while others of its type did: that is easily taken for silence."""
+        found, ids = [], self.session.messages.id
+        for name, stamp in self.service.inputs:
+            known = {other for own, other in self.service.inputs if own == name}
+            heard = {s: count for (id_, s), count in sorted(self._heard.items()) if id_ == ids(name)}
+            others = [f"{count} with sender stamp {s}" for s, count in heard.items() if s not in known]
+            if None not in known and stamp not in heard and others:
+                found.append(f"no {name}/{stamp} came, but {' and '.join(others)}")
+        return found
+
     def _tell_strangers(self) -> None:
         """In the reason of a failed verdict, because they may explain it, else as notes."""
-        strangers, verdict = self._stamps.strangers(), self.service.verdict
+        strangers, verdict = self.strangers(), self.service.verdict
         if strangers and verdict is not None and verdict.outcome == "failed":
-            self.service.verdict = replace(verdict, reason=with_strangers(verdict.reason, strangers), silent=False)
-            strangers = []
+            reason = "; ".join([verdict.reason, *strangers])
+            self.service.verdict, strangers = replace(verdict, reason=reason, silent=False), []
         for text in (*strangers, *self.service.notes):
             tell("note", text=text)
 

@@ -3,18 +3,16 @@
 Signals also end a service that is being built, which may wait for hardware.
 """
 
-import contextlib
 import logging
 import os
 import signal
 import stat
 import sys
 import threading
-import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from fnmatch import fnmatchcase
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 from google.protobuf.message import Message
@@ -29,30 +27,18 @@ from services.base.flags import Flags, FlagsError, load_manifest, parse
 from services.base.loop import Loop
 from services.base.members import Members, SenderTable, World, channel
 from services.base.runner import connected, say, tell
-from services.base.service import Build, Context, Service
+from services.base.service import Build, Context, Service, Verdict
 
 _OURS = ("dodo_dsl.", "services.")
 _BASE = Path(__file__).resolve().parent
 
 
-def tell_crash(error: Exception, folder: Path, *, expected: bool) -> None:
+def tell_crash(error: Exception, *, expected: bool) -> None:
     """Logs the error; the last line is one sentence. ``expected`` means that its own text is one for users."""
-    is_told = expected or type(error).__module__.startswith(_OURS)
-    if not is_told:
+    if not expected and not type(error).__module__.startswith(_OURS):
         logging.error("it ended by an error", exc_info=error)
     text = _unknown_field(error) or " ".join(str(error).split())
-    where = "" if is_told else place(error, folder)
-    logging.critical("%s", text if expected else f"{type(error).__name__}: {text}{where}")
-
-
-def place(error: Exception, folder: Path) -> str:
-    """The innermost place of an error in the code of a service in ``folder`` and its neighbours; empty without one."""
-    services = folder.resolve().parent
-    for frame in reversed(traceback.extract_tb(error.__traceback__)):
-        path = Path(frame.filename).resolve()
-        if path.is_relative_to(services) and frame.name != "<module>":
-            return f" ({path.relative_to(services.parent).as_posix()}:{frame.lineno}, in {frame.name})"
-    return ""
+    logging.critical("%s", text if expected else f"{type(error).__name__}: {text}")
 
 
 def _unknown_field(error: Exception) -> str:
@@ -87,29 +73,46 @@ def run(folder: Path, build: Build, argv: Sequence[str] | None = None, clock: Cl
         return _serve(role, manifest, folder, build, flags, clock, stop)
 
 
-class _Stop:
-    requested = False
-
-    def __call__(self) -> bool:
-        return self.requested
-
-    def request(self, _number: int, _frame: FrameType | None) -> None:
-        self.requested = True
+IsStopped = Callable[[], bool]
 
 
 @contextmanager
-def _signals() -> Iterator[_Stop]:
-    stop = _Stop()
-    old = {number: signal.signal(number, stop.request) for number in (signal.SIGTERM, signal.SIGINT)}
+def _signals() -> Iterator[IsStopped]:
+    """Whether a signal has asked the service to stop."""
+    requests: list[int] = []
+    with _handled(lambda number, _: requests.append(number)):
+        yield lambda: bool(requests)
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """A signal ends the service at once with code 0, and closes its resources; only in the main thread."""
+
+    def leave(_number: int, _frame: object) -> None:
+        raise SystemExit(0)
+
+    with _handled(leave):
+        yield
+
+
+@contextmanager
+def _handled(handler: Callable[[int, object], None]) -> Iterator[None]:
+    old = {number: signal.signal(number, handler) for number in (signal.SIGTERM, signal.SIGINT)}
     try:
-        yield stop
+        yield
     finally:
-        for number, handler in old.items():
-            signal.signal(number, handler)
+        for number, before in old.items():
+            signal.signal(number, before)
 
 
 def _serve(
-    role: str, manifest: Mapping[str, Any], folder: Path, build: Build, flags: Flags, clock: Clock | None, stop: _Stop
+    role: str,
+    manifest: Mapping[str, Any],
+    folder: Path,
+    build: Build,
+    flags: Flags,
+    clock: Clock | None,
+    stop: Callable[[], bool],
 ) -> int:
     code = USAGE
     try:
@@ -126,12 +129,12 @@ def _serve(
                     clock = _clock(session, role)
             on_rig = bool(os.environ.get("DODO_RIG"))
             service = build(Context(manifest["name"], flags, session.messages, resources, clock, session, on_rig))
-            code = BROKEN
-            if place and (service.drive or service.observe or not os.environ.get("DODO_CLOCK")):
-                session.hear_directly()
             members = _membership(session, role, world)
             stamp = flags["id"] if isinstance(flags["id"], int) else 0  # its own list gives each message one
             loop = Loop(role, service, session, clock, stamp, members, bool(flags["ends-input"]))
+            code = BROKEN
+            if place and (service.drive or service.observe or not os.environ.get("DODO_CLOCK")):
+                session.hear_directly()
             resources.enter_context(_readiness(place, role, session))
             try:
                 (service.drive or loop.run)(stop)
@@ -139,14 +142,21 @@ def _serve(
                 if place or _recording():  # by hand nobody reads it
                     _print_record(service)
             if service.verdict is not None:
+                for name in _undeclared(manifest, service.verdict):
+                    tell("note", text=f"check '{name}' is not under 'checks' in service.yml: no goal can name it")
                 say(service.verdict.line())
     except Exception as error:  # noqa: BLE001  (it is logged)
         if isinstance(error, MemoryTakenError):
             tell("taken", text=str(error))
         expected = code == USAGE and isinstance(error, ValueError | OSError)
-        tell_crash(error, folder, expected=expected)
+        tell_crash(error, expected=expected)
         return code if expected else BROKEN
     return DONE
+
+
+def _undeclared(manifest: Mapping[str, Any], verdict: Verdict) -> list[str]:
+    known = manifest.get("checks") or ("*",)
+    return [check.name for check in verdict.checks if not any(fnmatchcase(check.name, one) for one in known)]
 
 
 def _print_record(service: Service) -> None:
@@ -212,21 +222,6 @@ def _readiness(folder: Path | None, role: str, session: Session) -> Iterator[Non
     finally:
         if folder:
             address_book.leave(folder, role, session.address)
-
-
-@contextlib.contextmanager
-def interruptible() -> Iterator[None]:
-    """A signal ends the service at once with code 0, and closes its resources; only in the main thread."""
-
-    def leave(_number: int, _frame: object) -> None:
-        raise SystemExit(0)
-
-    old = {number: signal.signal(number, leave) for number in (signal.SIGTERM, signal.SIGINT)}
-    try:
-        yield
-    finally:
-        for number, handler in old.items():
-            signal.signal(number, handler)
 
 
 def stop_without_master() -> None:

@@ -108,6 +108,10 @@ class Verdict:
     silent: bool = False
     evidence: Mapping[str, float | str | None] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        if isinstance(self.checks, Check):
+            object.__setattr__(self, "checks", (self.checks,))
+
     def line(self) -> str:
         """The verdict line, without its line break; ASCII, whatever the locale."""
         checks = [check.as_json() for check in self.checks]

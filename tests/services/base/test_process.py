@@ -1,6 +1,5 @@
 """The tiny service as a process on a real bus."""
 
-import re
 import subprocess
 import sys
 import uuid
@@ -80,6 +79,7 @@ def test_a_message_decides(start: Start, cid: int) -> None:
         session.send(DISTANCE(distance=0.5))
         session.send(DISTANCE(distance=1.5))
         session.send(END())
+        assert service.line()["text"] == "check 'range' is not under 'checks' in service.yml: no goal can name it"
         assert service.line() == {
             "dodo": "verdict",
             "outcome": "failed",
@@ -100,7 +100,7 @@ def test_what_was_judged_comes_before_the_verdict_and_without_one(start: Start, 
         assert service.line() == {"dodo": "judged", **about}
         samples = service.line()
         assert (samples["samples"], samples["zero"], samples["marks"]) == ("Distance", 7, "Ag==")
-        assert service.line()["dodo"] == "verdict"
+        assert [service.line()["dodo"] for _ in range(2)] == ["note", "verdict"]
         assert service.end() == (0, "", "")
         stopped = start("--role=judge", DODO_CHANNEL=str(tmp_path))
         assert stopped.line() == READY
@@ -145,12 +145,9 @@ FIELD = "opendlv.proxy.GroundSteeringRequest has no field 'steering'; it has gro
 @pytest.mark.parametrize(
     ("role", "text"),
     [
-        ("broken", "ZeroDivisionError: a model went wrong (base/tiny/__main__.py:LINE, in update)"),
-        (
-            "library",
-            "JSONDecodeError: Expecting value: line 1 column 2 (char 1) (base/tiny/__main__.py:LINE, in update)",
-        ),
-        ("field", f"AttributeError: {FIELD} (base/tiny/__main__.py:LINE, in update)"),
+        ("broken", "ZeroDivisionError: a model went wrong"),
+        ("library", "JSONDecodeError: Expecting value: line 1 column 2 (char 1)"),
+        ("field", f"AttributeError: {FIELD}"),
         ("unjudgeable", "UnjudgeableError: the map has no goal"),
     ],
 )
@@ -158,7 +155,7 @@ def test_a_model_that_fails(start: Start, role: str, text: str) -> None:
     code, out, err = start(f"--role={role}").end()
     assert (code, out) == (1, '{"dodo": "ready"}\n')
     *steps, last = err.splitlines()
-    assert re.sub(r":\d+, in", ":LINE, in", last) == f"tiny-service: CRITICAL: {text}"
+    assert last == f"tiny-service: CRITICAL: {text}"
     assert bool(steps) == (role != "unjudgeable") == any("Traceback" in line for line in steps)
 
 

@@ -1,11 +1,10 @@
 import os
-import threading
 from collections.abc import Iterator
 
 import pytest
 
 from dodo_dsl.opendlv.shared_memory import SharedMemory
-from services.base.lockstep_clock import AnnouncedMemory, Announcer
+from services.base.lockstep_clock import AnnouncedMemory
 
 
 @pytest.fixture
@@ -27,36 +26,11 @@ def seen(memory: AnnouncedMemory) -> tuple[bytes, int]:
 
 
 def test_a_picture_is_seen_when_it_is_announced(memory: AnnouncedMemory) -> None:
-    announcer = Announcer(readers=0)
-    announcer.memories.append(memory)
     put(memory, b"old!", 1_700_000_000_000_000)
-    announcer.announce()
+    memory.announce()
     put(memory, b"new!", 1_700_000_000_100_000)
-    assert (announcer.new, announcer.sampled) == ([memory], 1_700_000_000_100_000)
+    assert (memory.is_new, memory.sampled) == (True, 1_700_000_000_100_000)
     assert seen(memory) == (b"old!", 1_700_000_000_000_000)
-    announcer.announce()
-    assert announcer.new == []
+    memory.announce()
+    assert not memory.is_new
     assert seen(memory) == (b"new!", 1_700_000_000_100_000)
-
-
-def test_readers_are_awaited_and_woken(memory: AnnouncedMemory) -> None:
-    announcer, woken = Announcer(readers=1), []
-    announcer.memories.append(memory)
-
-    def read() -> None:
-        with SharedMemory.attach(memory.name) as reader:
-            woken.append(reader.wait(20.0))
-
-    thread = threading.Thread(target=read)
-    thread.start()
-    assert announcer.await_readers(lambda: False)
-    put(memory, b"new!", 7)
-    announcer.announce()
-    thread.join()
-    assert woken == [True]
-
-
-def test_who_is_stopped_awaits_nobody(memory: AnnouncedMemory) -> None:
-    announcer = Announcer(readers=1)
-    announcer.memories.append(memory)
-    assert not announcer.await_readers(lambda: True)
