@@ -198,6 +198,7 @@ class ServiceOutput:
             await self._hear_echo(self.type_in)
         while await self._is_matched() and self.type_in is None and self._read_bytes < _ENOUGH and self._read():
             pass
+        await self._is_matched()
         is_full, self._read_bytes = self._read_bytes >= _FULL, 0
         return is_full
 

@@ -8,6 +8,7 @@ import contextlib
 import json
 from collections import Counter
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import msgspec
@@ -67,6 +68,15 @@ def _words(event: Event) -> str:
     return "ready" if isinstance(event, Ready) else getattr(event, "reason", "") or getattr(event, "text", "")
 
 
+@dataclass(eq=False)
+class _Peer:
+    """A service that has connected; its first message is its name."""
+
+    connection: Connection
+    name: str = ""
+    ended: asyncio.Event = field(default_factory=asyncio.Event)
+
+
 class Reports:
     """Takes what a test's services say, also into their logs; what evaluators judged goes into files next to these."""
 
@@ -78,8 +88,7 @@ class Reports:
         self._logs, self._put, self._outputs = logs, put, outputs
         self._recorded = Counter[str]()
         self._listener: Listener | None = None
-        self._unnamed: list[Connection] = []
-        self._open: dict[str, tuple[Connection, asyncio.Event]] = {}
+        self._peers: list[_Peer] = []
 
     def listen(self, folder: Path) -> None:
         """Listens in the folder where services meet until the application starts; raises OSError."""
@@ -87,30 +96,9 @@ class Reports:
         asyncio.get_running_loop().add_reader(self._listener.fileno(), self._accept)
 
     def _accept(self) -> None:
-        """Takes connections that have been made, and names that have come."""
         while self._listener is not None and (connection := self._listener.connection()):
-            self._unnamed.append(connection)
-            asyncio.get_running_loop().add_reader(connection.fileno(), self._name, connection)
-        for connection in list(self._unnamed):
-            self._name(connection)
-
-    def _name(self, connection: Connection) -> None:
-        try:
-            name = connection.receive(0.0)
-        except EOFError:
-            name = b""
-        if name is None:
-            return
-        loop, service = asyncio.get_running_loop(), name.decode("utf-8", "replace")
-        loop.remove_reader(connection.fileno())
-        self._unnamed.remove(connection)
-        if service not in self._services or (service in self._open and not self._open[service][1].is_set()):
-            connection.close()
-            return
-        self._open[service] = connection, asyncio.Event()
-        loop.add_reader(connection.fileno(), self._read, service)
-        if {*self._services} <= {*self._open}:
-            self.stop_listening()
+            self._peers.append(peer := _Peer(connection))
+            asyncio.get_running_loop().add_reader(connection.fileno(), self._read, peer)
 
     def stop_listening(self) -> None:
         """Nobody else can connect: the application is about to start, or all services are there."""
@@ -119,19 +107,32 @@ class Reports:
             self._listener.close()
             self._listener = None
 
-    def _read(self, name: str) -> None:
-        connection, ended = self._open[name]
+    def _read(self, peer: _Peer) -> None:
         try:
-            while (message := connection.receive(0.0)) is not None:
-                self.take(name, message)
+            while (message := peer.connection.receive(0.0)) is not None:
+                if peer.name:
+                    self.take(peer.name, message)
+                else:
+                    self._name(peer, message.decode("utf-8", "replace"))
         except EOFError:
-            asyncio.get_running_loop().remove_reader(connection.fileno())
-            connection.close()
-            ended.set()
+            self._drop(peer)
+
+    def _name(self, peer: _Peer, name: str) -> None:
+        """Raises EOFError for one that is no service, or is there already."""
+        if name not in self._services or any(other.name == name and not other.ended.is_set() for other in self._peers):
+            raise EOFError
+        peer.name = name
+        if {*self._services} <= {each.name for each in self._peers}:
+            self.stop_listening()
+
+    def _drop(self, peer: _Peer) -> None:
+        asyncio.get_running_loop().remove_reader(peer.connection.fileno())
+        peer.connection.close()
+        peer.ended.set()
 
     def take_line(self, name: str, line: bytes) -> bool:
         """Takes a line that a service printed, if it is a message of one that did not connect; whether it is."""
-        return name not in self._open and self.take(name, line)
+        return all(peer.name != name for peer in self._peers) and self.take(name, line)
 
     def take(self, name: str, message: bytes) -> bool:
         """Takes a message; whether it is one."""
@@ -160,21 +161,22 @@ class Reports:
 
     async def ended(self, name: str) -> None:
         """Returns when a service that has ended has said all; another program may still hold its connection."""
-        self._accept()
-        if name in self._open:
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._open[name][1].wait(), _PATIENCE_S)
+        self._read_all()
+        for peer in self._peers:
+            if peer.name == name:
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(peer.ended.wait(), _PATIENCE_S)
 
     def close(self) -> None:
         """Reads what is there already, and stops."""
-        self._accept()
+        self._read_all()
         self.stop_listening()
-        for connection in self._unnamed:
-            asyncio.get_running_loop().remove_reader(connection.fileno())
-            connection.close()
-        for name, (connection, ended) in self._open.items():
-            if not ended.is_set():
-                self._read(name)
-            if not ended.is_set():
-                asyncio.get_running_loop().remove_reader(connection.fileno())
-                connection.close()
+        for peer in self._peers:
+            if not peer.ended.is_set():
+                self._drop(peer)
+
+    def _read_all(self) -> None:
+        self._accept()
+        for peer in self._peers:
+            if not peer.ended.is_set():
+                self._read(peer)
