@@ -116,7 +116,6 @@ def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) ->
 
 
 def _limits_sentence(limits: Mapping[str, Any]) -> list[str]:
-    """What a rig says of its limits, if they are not the built-in ones."""
     if limits.get("from", "built") == "built":
         return []
     what = "its memory is damaged, and these limits hold" if limits["from"] == "damaged" else "limits in its memory"

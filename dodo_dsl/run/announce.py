@@ -20,7 +20,6 @@ TEST_BEGIN = "dodo.TestBegin"
 
 
 def begin_frame(seed: int) -> bytes:
-    """``dodo.TestBegin`` as a datagram, with the current time as its sample time."""
     begin = MessageSet.standard().type(TEST_BEGIN)
     return frame_of(begin(seed=seed))
 

@@ -35,8 +35,6 @@ _OF_MAKE = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")
 
 @dataclass(frozen=True)
 class ApplicationTime:
-    """The library and the agent, ready to run."""
-
     library: Path
     agent: Path
 
@@ -47,7 +45,6 @@ class ApplicationTime:
         return (str(self.agent), *flags, "--nested", *others)
 
     def variables(self, given: Mapping[str, str], plan: Plan, service: str, folder: str) -> dict[str, str]:
-        """The ``given`` variables of a service of the application, with those that give it the test's time."""
         number = [each.name for each in plan.application.services].index(service)
         return time_variables(given, number, plan.seed, str(self.library), folder)
 
@@ -84,7 +81,6 @@ def _changed(path: Path) -> int:
 
 
 def _is_ready(folder: Path) -> bool:
-    """Whether both are there, for this machine's processor."""
     own, *others = (_machine(_head(path, 20)) for path in (Path("/proc/self/exe"), folder / AGENT, folder / LIBRARY))
     return all(other == own for other in others)
 

@@ -27,7 +27,6 @@ _NO_DISPLAY = re.compile(
     r"|no Qt platform plugin could be initialized|Can't initialize GTK backend",
     re.IGNORECASE,
 )
-"""What GTK, Qt, X11 and OpenCV say without a display."""
 
 
 Cause = Literal["", "verdict", "end", "silence", "start"]
@@ -49,15 +48,12 @@ class Finding:
 
 @dataclass
 class Facts:
-    """What the engine saw: its own findings, and the verdicts of each evaluator."""
-
     evaluators: tuple[str, ...]
     findings: list[Finding] = field(default_factory=list)
     verdicts: dict[str, list[VerdictEvent]] = field(default_factory=dict)
 
 
 def outcome_of(plan: Plan, finding: Finding, backend: str, cid: int) -> Outcome:
-    """A test's outcome as far as plan and finding determine it; ``backend`` by its name."""
     return Outcome(
         name=plan.name,
         slug=plan.slug,
@@ -111,7 +107,6 @@ def _judged(evaluator: str, verdicts: Sequence[VerdictEvent]) -> list[Finding]:
 
 
 def error_outcome(plan: Plan, backend: str, reason: str) -> Outcome:
-    """The outcome of a test that never began; ``backend`` by its name."""
     return outcome_of(plan, Finding("error", reason), backend, plan.cid)
 
 

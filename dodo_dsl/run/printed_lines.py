@@ -149,17 +149,13 @@ class LinePattern:
 
 @dataclass
 class ServiceLines:
-    """The lines of one service so far; ``notes`` are sentences about lines that make no message."""
-
     service: str
     patterns: Sequence[LinePattern]
     has_matched: bool = False
     last: bytes = b""
-    """The last line that matched nothing."""
     notes: dict[str, str] = field(default_factory=dict)
     """By what is wrong, as each is said once; empty when it was."""
     is_over: bool = False
-    """Whether nothing more is to be matched."""
 
     def take(self, lines: Iterable[bytes]) -> list[Printed]:
         """The messages of lines, as many as patterns match; colours and what was written over do not count."""
@@ -221,7 +217,6 @@ class PrintedLines:
         self._send: Send = lambda data, to=(BUS,): None
 
     def connect(self, send: Send) -> None:
-        """``send`` sends a frame to the test's services, or on its bus."""
         self._send = send
 
     async def match(self, service: str, lines: Sequence[bytes]) -> None:
@@ -258,7 +253,6 @@ class PrintedLines:
             self._send(encode_frame(envelope), self._hearers[line])
 
     def close(self) -> None:
-        """Matches nothing more."""
         for each in self.services.values():
             each.is_over = True
         self._matcher.shutdown(wait=False, cancel_futures=True)

@@ -119,15 +119,11 @@ class Stopped(Struct, tag_field="dodo", tag="stopped", frozen=True):
 
 
 class GivenLimit(Struct, forbid_unknown_fields=True, frozen=True):
-    """What the value of a check may be."""
-
     min: int | float | UnsetType = UNSET
     max: int | float | UnsetType = UNSET
 
 
 class GivenCheck(Struct, forbid_unknown_fields=True, frozen=True):
-    """A check of a verdict."""
-
     name: Sentence
     value: int | float | None
     limit: GivenLimit
@@ -165,7 +161,6 @@ class VerdictEvent:
     silent: bool = False
 
     def as_json(self) -> Verdict:
-        """The verdict in ``results.json``."""
         outcome = "passed" if self.passed else "failed"
         return {
             "evaluator": self.service, "outcome": outcome, "reason": self.reason, "evidence": dict(self.evidence),
@@ -197,8 +192,6 @@ class Unstartable:
 
 @dataclass(frozen=True)
 class Lost:
-    """The backend itself is gone."""
-
     why: str
 
 

@@ -77,7 +77,6 @@ class RunState:
     paused: dict[str, float] = field(default_factory=dict)
     load: MachineLoad | None = None
     has_started: bool = False
-    """Whether the application rests in lockstep."""
     response: Response | None = None
     notes: list[str] = field(default_factory=list)
     graph: list[str] = field(default_factory=list)
@@ -99,7 +98,6 @@ class RunState:
         self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
 
     def test_s(self) -> float:
-        """How far the test is by its own time, as far as that is known."""
         if self.plan.lockstep:
             return self.time.seconds if self.time else 0.0
         return 0.0 if self.began is None else (self.finished or self.clock()) - self.began
@@ -155,7 +153,6 @@ class RunState:
                 self._remember(event)
 
     def _remember(self, event: Event) -> None:
-        """Takes an event that ends no test."""
         match event:
             case Ready(service):
                 self.ready.add(service)
@@ -215,7 +212,6 @@ class RunState:
 
     @property
     def finding(self) -> Finding:
-        """What decides, as far as it is known."""
         return decide(self.facts)
 
     def _details(self, finding: Finding, cid: int) -> list[str]:
@@ -259,7 +255,6 @@ class RunState:
         self._unmatched = backend.unmatched()
 
     def outcome(self, backend: Backend) -> Outcome:
-        """The test's outcome; the last lines are those of the service that decided it."""
         plan = self.plan
         services = [service.name for service in plan.application.services]
         answers = judgement.judged_response(self.response, plan.lockstep, services)
@@ -339,5 +334,4 @@ class Standing:
 
 
 def standing(state: RunState) -> Standing:
-    """How far a test is, by what is known now."""
     return Standing(state.time.seconds if state.time else 0.0, state.plan.lockstep is not None)

@@ -31,7 +31,6 @@ REPRINT = b"\x12"
 _REPRINTED = re.compile(rb"\^R\r?\n")
 
 Match = Callable[[Sequence[bytes]], Coroutine[Any, Any, None]]
-"""Takes lines; done when their messages are made."""
 
 
 class ServiceOutput:
@@ -88,7 +87,6 @@ class ServiceOutput:
         return self._reader, self._log.fileno()
 
     def add(self, line: str) -> None:
-        """Writes a line of the runner's into the log."""
         self._write(line.encode("utf-8", "replace") + b"\n")
 
     def close(self) -> None:
@@ -103,7 +101,6 @@ class ServiceOutput:
         self._write_times()
 
     def _read(self) -> bool:
-        """Reads once; whether there was something to read."""
         try:
             data = os.read(self._reader, 1 << 16)
         except BlockingIOError:
@@ -149,7 +146,6 @@ class ServiceOutput:
             self._tail.append(f"... dodo: the log cannot be written: {error.strerror}".encode())
 
     def _take(self, line: bytes) -> bool:
-        """Whether a line belongs into the log."""
         if self._skipping:
             self._skipping = False
             return True

@@ -83,7 +83,6 @@ class Reports:
     def __init__(
         self, plan: Plan, logs: Path, put: Callable[[Event], None], outputs: Mapping[str, ServiceOutput]
     ) -> None:
-        """``put`` gets each event."""
         self._services = {service.name: service for service in plan.services}
         self._logs, self._put, self._outputs = logs, put, outputs
         self._recorded = Counter[str]()
@@ -135,7 +134,6 @@ class Reports:
         return all(peer.name != name for peer in self._peers) and self.take(name, line)
 
     def take(self, name: str, message: bytes) -> bool:
-        """Takes a message; whether it is one."""
         is_evaluator = self._services[name].judge
         if is_evaluator and message.startswith(JUDGED):
             self._record(name, message)
@@ -168,7 +166,6 @@ class Reports:
                     await asyncio.wait_for(peer.ended.wait(), _PATIENCE_S)
 
     def close(self) -> None:
-        """Reads what is there already, and stops."""
         self._read_all()
         self.stop_listening()
         for peer in self._peers:

@@ -40,7 +40,6 @@ class Conditions:
         self._decide(name, COMPLETED, how_it_ended(code) if code else "")
 
     def failed(self, name: str) -> None:
-        """It could not be started."""
         for condition in _ASKED:
             self._decide(name, condition, "could not be started")
 

@@ -31,7 +31,6 @@ class Clock(ABC):
 
     @property
     def has_new_picture(self) -> bool:
-        """Whether there is a picture that is not announced yet."""
         return False
 
     @abstractmethod
@@ -95,7 +94,6 @@ class RealTimeClock(Clock):
             look_until(stopped)
 
     def _wait(self, due: int, inbox: "Loop", stopped: Callable[[], bool]) -> None:
-        """Deliver messages until the instant, and then those that are there already."""
         while (left := due - self.now()) > 0 and not stopped():
             _deliver(inbox, min(left / MICROSECONDS, _SLICE))
         for _ in range(_MAX_DRAINED):

@@ -48,11 +48,9 @@ class ClockClient:
         return command
 
     def answer(self, done: Done) -> None:
-        """The service has done it."""
         self._channel.send(done)
 
     def close(self) -> None:
-        """Close the channel."""
         self._channel.close()
 
     def _receive(self, timeout: float) -> Step | Show | None:
@@ -66,7 +64,6 @@ class ClockClient:
         return command
 
     def _drain(self, observe: Callable[[Envelope], None]) -> int:
-        """Take all that is on the bus; returns how many messages that was."""
         taken = 0
         while (envelope := self._session.receive(0.0)) is not None:
             if envelope.data_type != self._begin:

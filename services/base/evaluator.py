@@ -42,7 +42,6 @@ class Hidden(list[int]):
             self += begin, end
 
     def hides(self, time: int) -> bool:
-        """Whether nothing was shown then."""
         return bisect_right(self, time) % 2 == 1
 
     def shown(self, time: int) -> int:
@@ -64,7 +63,6 @@ class Evaluator(Service, ABC):
     def __init__(self, max_time: float, max_delay: float = 0.0) -> None:
         """``max_time`` in s after time zero; ``max_delay`` in s in which answers may follow the end of the input."""
         self.now: int | None = None
-        """The time of the last update."""
         self.judged = Judged()
         self.hidden, self.hidden_samples = Hidden(), Hidden()
         """When a player of the test could not show frames, in the test's time and in that of their samples."""
@@ -114,16 +112,13 @@ class Evaluator(Service, ABC):
         return (time - self._zero) / MICROSECONDS
 
     def is_overdue(self, time: int) -> bool:
-        """Whether a time is past ``max_time``."""
         return self.elapsed(time) > self._max_time
 
     def conclude(self, span: JudgedTime) -> None:
-        """Give the verdict, unless there is one."""
         if self.verdict is None:
             self.verdict = self.decide(span)
 
     def time_is_over(self) -> None:
-        """``max_time`` has passed: give the verdict."""
         seconds = f"{self._max_time:.2f} s"
         self.conclude(JudgedTime(f"within {seconds}", f"for {seconds}"))
 

@@ -12,7 +12,6 @@ import yaml
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 About = Mapping[str, Any]
-"""A manifest's entry for one parameter."""
 
 COMMON: dict[str, About] = {
     "cid": {
@@ -40,7 +39,6 @@ COMMON: dict[str, About] = {
 
 
 def load_manifest(folder: Path) -> dict[str, Any]:
-    """The service's own ``service.yml``."""
     manifest: dict[str, Any] = yaml.load((folder / "service.yml").read_text(encoding="utf-8"), _LOADER)  # noqa: S506
     return manifest
 
@@ -57,7 +55,6 @@ def unit(about: About) -> str:
 
 
 def bounds(about: About) -> str:
-    """The allowed values: a range, choices, or nothing."""
     low, high = about.get("minimum"), about.get("maximum")
     if about.get("choices"):
         return ", ".join(about["choices"])
@@ -69,7 +66,6 @@ def bounds(about: About) -> str:
 
 
 def example_of(about: About) -> str:
-    """An example value for a flag."""
     for value in (about.get("example"), about.get("default"), (about.get("choices") or [None])[0]):
         if isinstance(value, bool):
             return str(value).lower()
@@ -207,7 +203,6 @@ def example_line(manifest: Mapping[str, Any]) -> str:
 
 
 def _wanted(name: str, values: Sequence[str | bool]) -> str:
-    """``--drive=kiwi or bicycle``."""
     return f"--{name}={' or '.join(str(value).lower() for value in values if value != '')}"
 
 

@@ -18,7 +18,6 @@ MOST_SERIES = 50
 MOST_BOXES = 60_000
 """Of all frames together: frames after these are left out."""
 FINE, WARNED, FAILED = 0, 1, 2
-"""Marks of samples."""
 
 _PART, _BOXES_OF_A_LINE, _MOST_TEXT, _FARTHEST = 2000, 60, 60, 100.0
 _DIGITS = 4
@@ -68,11 +67,9 @@ class Series:
         self._target.add(time, target)
 
     def clear(self) -> None:
-        """Forget all samples."""
         self._times, self._values, self._marks, self._target = array("q"), array("d"), bytearray(), None
 
     def lines(self) -> Iterator[dict[str, Any]]:
-        """The series, and then its samples in parts."""
         limits = {name: finite(getattr(self, name)) for name in ("low", "high", "distance", "band")}
         yield {"series": self.name, "unit": self.unit, "exclusive": self.exclusive, **limits}
         yield from self._parts("samples")
@@ -105,7 +102,6 @@ class Series:
         return (self.low is not None and value < self.low) or (self.high is not None and value > self.high)
 
     def _thin(self) -> None:
-        """Half of the samples stay."""
         kept = [n for begin in range(0, len(self._times), 4) for n in self._two_of(begin)]
         self._times = array("q", [self._times[n] for n in kept])
         self._values = array("d", [self._values[n] for n in kept])
@@ -167,7 +163,6 @@ class Judged:
         self._way = {"frame": frame_id, "length": length, "width": width, "roles": dict(roles)}
 
     def clear(self) -> None:
-        """The test begins: what was judged before does not count."""
         for each in self._series:
             each.clear()
         self._frames.clear()
@@ -190,7 +185,6 @@ class Judged:
         yield from self._frame_lines()
 
     def _frame_lines(self) -> Iterator[dict[str, Any]]:
-        """Frames in parts; one with many boxes is in several of them."""
         rows: list[list[Any]] = []
         left = _BOXES_OF_A_LINE
         for time, boxes in self._frames:
@@ -207,7 +201,6 @@ class Judged:
 
 
 def finite(value: float | None) -> float | None:
-    """The number, None if it is none."""
     return None if value is None or not math.isfinite(value) else float(value)
 
 

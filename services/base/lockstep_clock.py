@@ -57,7 +57,6 @@ class AnnouncedMemory(SharedMemory):
         self.sampled = time_us
 
     def notify_all(self) -> None:
-        """There is a new picture; ``announce`` will notify its readers."""
         self.is_new = True
 
     def announce(self) -> None:
@@ -99,7 +98,6 @@ class Observer:
         self._relayed: deque[set[_Key]] = deque(maxlen=_REMEMBERED)
 
     def collect(self, envelope: Envelope) -> None:
-        """An envelope that was on the bus."""
         self._collected.append(envelope)
 
     def deliver(self, inbox: "Loop", until: int, relayed: Sequence[Envelope]) -> None:
@@ -130,7 +128,6 @@ class Observer:
 
 
 def _key(envelope: Envelope) -> _Key:
-    """The same for every copy of a message."""
     return envelope.data_type, envelope.payload, envelope.sent, envelope.sample_time, envelope.sender_stamp
 
 
@@ -230,7 +227,6 @@ class LockstepClock(Clock):
             self._answer()
 
     def _show(self, command: Show, stopped: Callable[[], bool]) -> bool:
-        """False when ``stopped`` before."""
         if command.awaits:
             look_until(lambda: self._is_awaited() or stopped(), _POLL_S, _LONGEST_POLL_S)
             if not self._is_awaited():
@@ -271,7 +267,6 @@ class LockstepClock(Clock):
             look_until(stopped)
 
     def _command(self, inbox: "Loop", stopped: Callable[[], bool]) -> Step | Show | None:
-        """The next command; None when the service is to stop."""
         while not (stopped() or self._source.is_over):
             if command := self._source.next(inbox.observes, self._observer.collect):
                 self._open = True

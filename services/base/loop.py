@@ -37,7 +37,6 @@ class Lateness:
         self._worst = 0
 
     def begin(self) -> None:
-        """The test begins."""
         self._has_begun = True
 
     def add(self, due: int, ended: int) -> None:
@@ -85,10 +84,8 @@ class Loop:
     """Whether the verdict ends the test: the others decide on what came until then."""
     _handlers: dict[int, list[tuple[int | None, Handler, Layout]]] = field(default_factory=dict)
     _heard: Counter[tuple[int, int]] = field(default_factory=Counter)
-    """Messages by id and sender stamp of the types that the service takes."""
     _unusable: set[tuple[int, int]] = field(default_factory=set)
     _began: int | None = None
-    """When the test began, in us."""
     _reported: int = 0
     _paused: float = 0.0
     _report_after: int = 0
@@ -160,21 +157,17 @@ class Loop:
             self.handle(envelope)
 
     def receive(self, timeout: float) -> Envelope | None:
-        """For the clock: the next envelope within ``timeout`` seconds."""
         return self.session.receive(timeout)
 
     @property
     def observes(self) -> bool:
-        """For the clock: whether the service observes everything on the bus."""
         return self.service.observe is not None
 
     @property
     def consumes(self) -> frozenset[int]:
-        """For the clock: ids of the messages that are handled here."""
         return frozenset([*self._handlers, self._begin, self._end])
 
     def observe(self, envelope: Envelope) -> None:
-        """For the clock: an envelope that the service may only observe."""
         if self.service.observe is not None:
             self.service.observe(envelope)
 
@@ -249,7 +242,6 @@ class Loop:
             tell("paused", seconds=round(self._paused, 3))
 
     def _send(self, output: Message | Output | Envelope | list[Framed], now: int) -> None:
-        """Send on the bus, or where the application is not."""
         if not isinstance(output, list):
             output = [(output if isinstance(output, Envelope) else self._envelope(output, now), b"")]
         frames = []

@@ -75,7 +75,6 @@ class SenderTable:
 
     @property
     def ids(self) -> frozenset[int]:
-        """Ids of all messages that not everybody may send."""
         return frozenset([*self._of_runner, *(id_ for id_, _ in self.by_message)])
 
     def producers(self, envelope: Envelope) -> Producers | None:
@@ -104,7 +103,6 @@ class SenderTable:
             self.report(f"the application sent {name} to {to} {when}: {number}, not a finite number")
 
     def report(self, reason: str) -> None:
-        """Report to the runner why the test fails."""
         if reason not in self._reported:
             self._reported.add(reason)
             tell("foreign", reason=reason)

@@ -34,7 +34,6 @@ class PolledMemory:
 
     @property
     def size(self) -> int:
-        """Bytes of the memory, 0 while there is none."""
         return self._memory.size if self._memory else 0
 
     def poll(self, now: int, take: Callable[[SharedMemory, int], Found | None]) -> Found | None:
@@ -57,7 +56,6 @@ class PolledMemory:
             return None
 
     def skip(self) -> None:
-        """Pass over the picture that is there now."""
         if self._memory is not None:
             with suppress(SharedMemoryError), self._memory.lock(self._patience):
                 self.pass_over(self._memory.sample_time())
@@ -67,7 +65,6 @@ class PolledMemory:
         self.last = time
 
     def close(self) -> None:
-        """Detach from the memory."""
         if self._memory is not None:
             self._memory.close()
             self._memory, self._is_known = None, False

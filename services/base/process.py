@@ -160,7 +160,6 @@ def _undeclared(manifest: Mapping[str, Any], verdict: Verdict) -> list[str]:
 
 
 def _print_record(service: Service) -> None:
-    """What an evaluator judged, as far as it came; without a verdict, too."""
     if service.judged is not None:
         service.record()
         checks = service.verdict.checks if service.verdict else ()
@@ -191,7 +190,6 @@ def _session(cid: int, messages: MessageSet) -> Session:
 
 
 def _clock(session: Session, role: str) -> Clock:
-    """The test's clock, by ``DODO_CLOCK``."""
     if (recording := _recording()) is not None:
         from services.base.recorded_clock import clock_of
 

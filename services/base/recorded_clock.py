@@ -43,7 +43,6 @@ class RecordedSteps:
         self.is_over = False
 
     def next(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | None:
-        """The next step; None at the end of the recording."""
         step = next(self._steps, None)
         if step is None:
             self.is_over = True
@@ -51,7 +50,6 @@ class RecordedSteps:
         return Step(step.time, [each for each in step.messages if not self._is_own(each)])
 
     def answer(self, done: Done) -> None:
-        """The service has finished a step."""
         self._sent.update(map(_key, done.messages))
 
     def close(self) -> None:
@@ -98,7 +96,6 @@ def _decoded(frames: bytes) -> Iterator[Envelope]:
 
 
 def _key(envelope: Envelope) -> Envelope:
-    """The same for a message of the test and the same one of now."""
     return envelope._replace(sent=0, received=0)
 
 

@@ -77,7 +77,6 @@ class Check:
 
 
 def said(value: float | None) -> str:
-    """A number in a sentence."""
     return "nothing" if value is None else str(value) if isinstance(value, int) else f"{value:z.4g}"
 
 
@@ -139,7 +138,6 @@ class UnusableMessageError(ValueError):
 
 
 Handler = Callable[[Any, int], None]
-"""Takes a message and its sample time in microseconds."""
 
 
 class Output(NamedTuple):
@@ -214,7 +212,6 @@ class Context:
 
     @property
     def log(self) -> logging.Logger:
-        """The service's log, on stderr."""
         return logging.getLogger(self.name)
 
     def memory(self, name: str, size: int) -> SharedMemory:

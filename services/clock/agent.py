@@ -33,8 +33,6 @@ class Busy(msgspec.Struct):
 
 
 class ProgramNote(msgspec.Struct):
-    """What is to be said of a program of a service."""
-
     kind: _Text
     service: int
     name: _Text

@@ -46,7 +46,6 @@ class Answers:
     relayed: tuple[MessageFilter, ...] = ()
     done: MessageFilter | None = None
     is_silent: bool = True
-    """Whether nothing that matters has come yet."""
     _times: set[int] = field(default_factory=set)
     _all_times: set[int] = field(default_factory=set)
     _chosen: dict[MessageFilter, Envelope] = field(default_factory=dict)
@@ -64,7 +63,6 @@ class Answers:
         self._surplus.clear()
 
     def seen(self) -> None:
-        """The frame was seen: all that is taken from now on came after it."""
         self._is_seen = True
 
     def take(self, envelope: Envelope) -> None:
@@ -102,17 +100,14 @@ class Answers:
 
     @property
     def filters(self) -> tuple[MessageFilter, ...]:
-        """All messages that matter here."""
         return (*self.required, *self.relayed, *([self.done] if self.done else []))
 
     @property
     def is_expected(self) -> bool:
-        """Whether any message is known to answer a frame."""
         return bool(self.required) or self.done is not None
 
     @property
     def missing(self) -> list[str]:
-        """Names of the messages that the answer lacks."""
         if self.done is not None:
             return [] if self._is_done else [self.done.name]
         return [each.name for each in self.required if each not in self._chosen]
@@ -209,7 +204,6 @@ class AnsweringApplication:
         self.waited += spent if self.frames > 1 else 0.0
 
     def collect(self) -> list[Envelope]:
-        """The application's messages since the last time, for the services."""
         return self.answers.collect()
 
     @property

@@ -44,7 +44,6 @@ class Exchange:
         self._own: set[Address] = set()
 
     def send(self, service: str, command: Step | Show) -> None:
-        """Command a service, as soon as it has connected."""
         self._expected[service] = self._expected.get(service, 0) + 1
         if service in self._channels:
             self._channels[service].send(command)
@@ -84,7 +83,6 @@ class Exchange:
             select.select([*self._session.filenos(), *channels], [], [], max(0.0, min(timeout, SLICE_S)))
 
     def drain(self) -> None:
-        """Take everything that is on the bus already."""
         while self._take_from_bus():
             pass
 
@@ -114,7 +112,6 @@ class Exchange:
         self._session.hear_only((), ids, self._own)
 
     def close(self) -> None:
-        """Close the connections of all services."""
         self._listener.close()
         for channel in self._channels.values():
             channel.close()
@@ -138,31 +135,22 @@ class TestEnded(Exception):
 
 
 class ApplicationSilent(TestEnded):
-    """The application did not answer in time."""
-
     kind = "unanswered"
 
 
 class ApplicationFloods(TestEnded):
-    """The application sends far more than it is asked for."""
-
     kind = "unanswered"
 
 
 class ServiceSilent(TestEnded):
-    """A service of the test does not answer the clock."""
-
     kind = "stuck"
 
 
 class TimeOver(TestEnded):
-    """The test time is over."""
-
     kind = "timedout"
 
 
 IsStopped = Callable[[], bool]
-"""Whether the clock has to stop."""
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,6 @@ class Stepper:
         return {**self._spent, **application}
 
     def takers(self, data_type: int) -> list[str]:
-        """The services that handle messages with this id, in their order."""
         return [name for name in self.roles.all if data_type in self._consumed.get(name, ())]
 
     def connect(self) -> None:
@@ -129,7 +128,6 @@ class Stepper:
         return set(self.roles.judge) <= self._ended
 
     def _go_each(self, names: Sequence[str]) -> list[Done]:
-        """Let services go on to this step, one after the other; raises ServiceSilent."""
         return [result for name in names for result in self._go((name,), self.now)]
 
     def _go(self, names: Sequence[str], until: int) -> list[Done]:

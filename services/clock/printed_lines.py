@@ -25,7 +25,6 @@ class PrintedLines:
         self._turns, self._goes_on = 0, False
 
     def take(self, envelope: Envelope) -> bool:
-        """Whether a message is the runner's answer."""
         if envelope.data_type != self._id:
             return False
         self._read = envelope

@@ -52,7 +52,6 @@ class SentMessages:
 
     heard: tuple[MessageFilter, ...]
     answers: int = 0
-    """Steps in which it sent something that matters."""
     uncopied: int = 0
     """Those of them but the first in which that did not carry the sample time of the last frame."""
     _frames: set[int] = field(default_factory=set)
@@ -61,7 +60,6 @@ class SentMessages:
 
     @property
     def filters(self) -> tuple[MessageFilter, ...]:
-        """All messages that matter here."""
         return self.heard
 
     def expect(self, sampled: Iterable[int]) -> None:
@@ -107,7 +105,6 @@ class ResponseTimes:
     _frames: list[int] = field(default_factory=list)
 
     def add(self, frame: int, taken_s: float) -> None:
-        """One more answer, to the frame with this number."""
         self._taken.append(taken_s)
         self._frames.append(frame)
 
@@ -172,18 +169,14 @@ class RestingApplication:
         self._names, self._note = names, note
         self._noted: set[str] = set()
         self.lines: PrintedLines | None = None
-        """What it prints as messages, if it does."""
         self._unread: set[str] = set()
         """Cameras whose pictures nobody has waited for yet."""
         self._held: list[str] = []
-        """Those of them that have a new one."""
         self._shown_at = self._until = 0
         self._taken_s = 0.0
-        """What it has computed in this step."""
         self._gone: frozenset[int] = frozenset()
 
     def facts(self) -> dict[str, Any]:
-        """What the clock reports of the answers at the end."""
         for camera in sorted(self._unread):
             self._note_once(f"no program of the application waited for a frame of '{camera}'")
         facts = self.response.facts()

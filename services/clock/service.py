@@ -30,7 +30,6 @@ A short test needs them closer, because what was measured by the wall clock is p
 """
 _SLICE = 0.05
 BEGIN = "dodo.TestBegin"
-"""What the clock consumes besides the application's answers."""
 
 _log = logging.getLogger(__name__)
 
@@ -43,8 +42,6 @@ class OwnTime(NamedTuple):
 
 
 class ClockService(Service):
-    """Drives a test by its Stepper."""
-
     def __init__(
         self,
         session: Session,
@@ -82,7 +79,6 @@ class ClockService(Service):
         self._stepper = Stepper(roles, timing.period, timing.timeout, self._application, exchange, self._over)
         self._reported = self._begun = 0.0
         self._reached = 0
-        """The time that was reported at last."""
         self._stopped: Callable[[], bool] = lambda: False
         self.drive = self._drive
 
@@ -113,7 +109,6 @@ class ClockService(Service):
             tell("stopped", how=ended.kind, reason=str(ended), silent=ended.silent)
 
     def _take(self, envelope: Envelope) -> None:
-        """Take a message of the application, or of the runner."""
         if self._lines and self._lines.take(envelope):
             return
         takers = self._stepper.takers(envelope.data_type)

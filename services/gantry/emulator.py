@@ -19,7 +19,6 @@ PLACES = (Path(__file__).resolve().parents[2] / "build" / "firmware", Path("/opt
 START = "-0.89,-0.69,-150"
 """Where it stands at first (m, m, degrees): near its home, so that finding that is quick."""
 CIRCLE = ("--kind", "circle", "--start", "-0.89,-0.69,-170")
-"""The same of a rig whose yaw turns without end."""
 
 MOST_PAUSED, MOST_PAUSED_SHARE = 0.25, 0.05
 """s for which it may stand still, as the machine keeps it waiting, and the share of a longer test; no real rig does.
@@ -77,7 +76,6 @@ class EmulatedRig:
         return self._true
 
     def close(self) -> None:
-        """End the program."""
         self._process.terminate()
         with contextlib.suppress(OSError):
             if self._process.stdin is not None:
@@ -96,7 +94,6 @@ class EmulatedRig:
         self.close()
 
     def _read(self) -> None:
-        """The thread that reads the program's output up to its end."""
         assert self._process.stdout is not None
         with self._process.stdout as lines:
             for line in lines:

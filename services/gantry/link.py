@@ -68,7 +68,6 @@ def checked(target: str) -> str:
 
 @contextlib.contextmanager
 def _as_os_errors() -> Iterator[None]:
-    """Errors of a port that went away, as OSError."""
     try:
         yield
     except (termios.error, TypeError, ValueError) as error:
@@ -105,8 +104,6 @@ class RigError(RuntimeError):
 
 
 class LinkAnswers(NamedTuple):
-    """A rig's answers; None for one that did not come."""
-
     at: Position | None = None
     status: Status | None = None
     refusals: tuple[Refusal, ...] = ()

@@ -82,7 +82,6 @@ def _answers(link: Link) -> tuple[int, float]:
 
 
 ACTIONS = {"status": 0, "home": 0, "goto": 3, "calibrate": 0, "check": 0}
-"""How many numbers each takes."""
 DONE, BROKEN, USAGE = 0, 1, 2
 
 
@@ -91,7 +90,6 @@ class ManualUsageError(ValueError):
 
 
 def main(argv: Sequence[str], stdout: TextIO) -> int:
-    """Do one action and print its result."""
     try:
         flags, action, numbers = _parsed(argv)
         limits, kept = _limits(flags), kept_limits(flags)

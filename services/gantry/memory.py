@@ -156,7 +156,6 @@ def _true(limits: Mapping[str, float], conversion: Conversion) -> dict[str, floa
 
 
 def _text(limits: Mapping[str, float], conversion: Conversion) -> str:
-    """Limits of the firmware as true ones."""
     return ", ".join(f"{name} {value:g} {UNITS[name]}" for name, value in _true(limits, conversion).items())
 
 

@@ -31,9 +31,7 @@ class AxisConstants:
 BUILT_IN = {
     axis: AxisConstants(STEPS[axis] * (math.degrees(1) if axis == "yaw" else 1.0), OFFSETS[axis]) for axis in STEPS
 }
-"""What the firmware converts with."""
 BUILT_IN_CIRCLE = {**BUILT_IN, "yaw": AxisConstants(CIRCLE_STEPS / math.tau, CIRCLE_OFFSET)}
-"""The same where the yaw turns without end."""
 
 
 class Conversion:
@@ -124,7 +122,6 @@ class MotionLimits:
     high: Position = FARTHEST
 
     def holds(self, position: Position) -> bool:
-        """Whether a position is within the box."""
         inside = self.low.x <= position.x <= self.high.x and self.low.y <= position.y <= self.high.y
         return inside and self.low.yaw <= position.yaw <= self.high.yaw
 
@@ -184,7 +181,6 @@ class Shaper:
         return self.velocity
 
     def halt(self) -> None:
-        """The rig was commanded to stop."""
         self.velocity = Velocity()
 
     def _before_the_edge(self, v: Velocity, at: Position, lag: float) -> Velocity:

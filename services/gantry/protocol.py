@@ -21,8 +21,6 @@ _ANSWER = re.compile(rf"\$(?:(?P<word>ERROR|LIMITS):)?(?P<numbers>{_NUMBER}(?:,{
 
 
 class Word(StrEnum):
-    """The commands."""
-
     GOTO = "GOTO"
     RUN = "RUN"
     STOP = "STOP"
@@ -66,8 +64,6 @@ class Limits:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a line was not obeyed, as rig_table numbers it."""
-
     code: int
 
     @property

@@ -62,8 +62,6 @@ INDEX = 10, 3
 
 
 class Status(IntEnum):
-    """What the rig says of itself."""
-
     IDLE = 0
     MOVING = 1
     HOMING = 2
@@ -76,8 +74,6 @@ class Status(IntEnum):
 
 
 class Error(IntEnum):
-    """Why a line was not obeyed."""
-
     UNKNOWN = 1
     COUNT = 2
     NUMBER = 3
@@ -91,8 +87,6 @@ class Error(IntEnum):
 
 
 class Source(IntEnum):
-    """Where the limits are from that the rig says."""
-
     BUILT = 0
     KEPT = 1
     DAMAGED = 2

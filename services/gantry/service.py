@@ -158,12 +158,10 @@ class Gantry(Service):
 
 
 def place(at: Position) -> str:
-    """A position for sentences."""
     return f"at x = {at.x:.3f} m, y = {at.y:.3f} m, yaw = {math.degrees(at.yaw):.1f} degrees"
 
 
 def describe(status: Status) -> str:
-    """A status for messages."""
     return f"the rig {SENTENCES[status]}" if status in SENTENCES else f"the rig is {status.name.lower()}"
 
 

@@ -38,7 +38,6 @@ def settle(link: Link, status: Status) -> None:
 
 
 def trouble(link: Link, status: Status) -> str:
-    """A sentence on a status that ends a test."""
     return f"the rig at {link.name} {SENTENCES[status]} (status {int(status)})"
 
 

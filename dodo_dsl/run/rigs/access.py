@@ -27,7 +27,6 @@ from dodo_dsl.spec.rig import Rig
 MANUAL = ("python", "-m", "services.gantry.manual")
 PATIENCE_S = 180.0
 Command = tuple[Sequence[str], Sequence[str]]
-"""A rig's program, and its words."""
 _END_S = 5.0
 
 

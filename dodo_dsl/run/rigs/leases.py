@@ -69,7 +69,6 @@ def devices_in(words: Iterable[str]) -> list[str]:
 
 
 def devices_of(plan: Plan) -> list[str]:
-    """The hardware that a test's services use."""
     return devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
 
 
@@ -107,7 +106,6 @@ def quarantine_folder(is_hardware: bool = False) -> Path:
 
 
 def _files(rig: str, devices: Sequence[str]) -> list[Path]:
-    """The file of the rig's name, and of each device."""
     if not _NAME.fullmatch(rig):
         raise RigProblem(f"'{rig}' is not a rig's name, expected lower-case letters, digits and hyphens")
     place = quarantine_folder(any(map(is_hardware_device, devices)))
