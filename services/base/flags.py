@@ -1,6 +1,7 @@
 """Flags in OpenDLV style, ``--key=value``, by the service's manifest, which the compiler validates."""
 
 import argparse
+import math
 import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
@@ -93,17 +94,34 @@ Value = int | float | str | bool | list[Any] | Share | None
 
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
 _INTEGER = re.compile(r"[-+]?[0-9]{1,20}")
-_KINDS = {
-    "number": "a finite number",
-    "integer": "a whole number",
-    "amount": "a finite number",
-    "boolean": "true or false",
-    "path": "a path",
-    "memory": "a name",
-    "output": "a file to write",
-    "list": "a list of items with commas between them",
-}
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
+
+
+def _number(text: str) -> float | None:
+    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    return value if math.isfinite(value) else None
+
+
+def _amount(text: str) -> float | Share | None:
+    number = _number(text.removesuffix("%"))
+    return number if number is None or not text.endswith("%") else Share(number / 100)
+
+
+def _text(text: str) -> str | None:
+    return text or None
+
+
+_KINDS: dict[str, tuple[str, Callable[[str], Value]]] = {
+    "number": ("a finite number", _number),
+    "integer": ("a whole number", lambda text: int(text) if _INTEGER.fullmatch(text) else None),
+    "amount": ("a finite number", _amount),
+    "boolean": ("true or false", lambda text: _BOOLEANS.get(text.lower())),
+    "path": ("a path", _text),
+    "memory": ("a name", _text),
+    "output": ("a file to write", _text),
+    "list": ("a list of items with commas between them", lambda text: [part for part in text.split(",") if part]),
+}
+"""What a value of each type is, and its reader, which gives None for anything else."""
 
 
 class FlagsError(ValueError):
@@ -134,12 +152,7 @@ def parse(manifest: Mapping[str, Any], argv: Sequence[str]) -> Flags:
     for group in manifest.get("one-of") or ():
         if not any(name in given for name in group):
             raise FlagsError(f"give one or more of --{', --'.join(group)}")
-    values = Flags({name: given.get(name, _default(about)) for name, about in known.items()})
-    for name in given:
-        for other, wanted in (known[name].get("when") or {}).items():
-            if ("" if values[other] is None else values[other]) not in wanted:
-                raise FlagsError(f"--{name} is for {_wanted(other, wanted)}")
-    return values
+    return Flags({name: given.get(name, _default(about)) for name, about in known.items()})
 
 
 def _default(about: About) -> Value:
@@ -148,12 +161,13 @@ def _default(about: About) -> Value:
 
 
 def _value(name: str, about: About, text: str) -> Value:
-    kind = about["type"]
     if "of" in about:
         item = {**{key: fact for key, fact in about.items() if key != "of"}, "type": about["of"]}
         return [_value(name, item, part) for part in text.split(",") if part]
-    value = _CONVERTERS.get(kind, str)(text) if text or kind in ("string", "list") else None
-    expected = _KINDS.get(kind, "") + (f" in{unit(about)}" if unit(about) else "")
+    kind, read = _KINDS.get(about["type"], ("a text", str))
+    value, expected = read(text), kind + (f" in{unit(about)}" if unit(about) else "")
+    amount = value.of_one if isinstance(value, Share) else value
+    low, high = about.get("minimum", -math.inf), about.get("maximum", math.inf)
     if value is None:
         raise FlagsError(f"--{name}={text} is not {expected}")
     if about.get("choices") and value not in about["choices"]:
@@ -162,36 +176,9 @@ def _value(name: str, about: About, text: str) -> Value:
         raise FlagsError(f"--{name}={text} is a share, expected {expected}")
     if isinstance(value, int) and value % (step := about.get("multiple-of", 1)):
         raise FlagsError(f"--{name}={text} is not a multiple of {step}")
-    if not _allowed(about, value):
+    if isinstance(amount, int | float) and not low <= amount <= high:
         raise FlagsError(f"--{name}={text} is out of range, expected {bounds(about)}{unit(about)}")
     return value
-
-
-def _allowed(about: About, value: Value) -> bool:
-    value = value.of_one if isinstance(value, Share) else value
-    if not isinstance(value, int | float):
-        return True
-    low, high = about.get("minimum"), about.get("maximum")
-    return (low is None or value >= low) and (high is None or value <= high)
-
-
-def _number(text: str) -> float | None:
-    value = float(text) if _NUMBER.fullmatch(text) else None
-    return value if value is not None and value - value == 0.0 else None
-
-
-def _amount(text: str) -> float | Share | None:
-    number = _number(text.removesuffix("%"))
-    return number if number is None or not text.endswith("%") else Share(number / 100)
-
-
-_CONVERTERS: dict[str, Callable[[str], Value]] = {
-    "number": _number,
-    "amount": _amount,
-    "integer": lambda text: int(text) if _INTEGER.fullmatch(text) else None,
-    "boolean": lambda text: _BOOLEANS.get(text.lower()),
-    "list": lambda text: [part for part in text.split(",") if part],
-}
 
 
 def example_line(manifest: Mapping[str, Any]) -> str:
@@ -202,13 +189,8 @@ def example_line(manifest: Mapping[str, Any]) -> str:
     return shlex.join([*manifest["process"], *words])
 
 
-def _wanted(name: str, values: Sequence[str | bool]) -> str:
-    return f"--{name}={' or '.join(str(value).lower() for value in values if value != '')}"
-
-
 def _help(about: About) -> str:
     facts = [about["type"] + unit(about), bounds(about)]
     if about.get("default") not in (None, [], ""):
         facts.append(f"default {example_of({'default': about['default'], 'type': about['type']})}")
-    facts += [f"with {_wanted(other, wanted)}" for other, wanted in (about.get("when") or {}).items()]
     return f"{about['help']} ({', '.join(filter(None, facts))})".replace("%", "%%")
