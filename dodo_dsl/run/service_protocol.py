@@ -117,7 +117,7 @@ class Reports:
             self._drop(peer)
 
     def _name(self, peer: _Peer, name: str) -> None:
-        """Raises EOFError for one that is no service, or is there already."""
+        """Raises EOFError for an unknown service, and for one that is there already."""
         if name not in self._services or any(other.name == name and not other.ended.is_set() for other in self._peers):
             raise EOFError
         peer.name = name

@@ -43,9 +43,8 @@ class Series:
     exclusive: bool = False
     distance: float | None = None
     band: float | None = None
-    _times: "array[int]" = field(default_factory=lambda: array("q"), repr=False)
-    _values: "array[float]" = field(default_factory=lambda: array("d"), repr=False)
-    _marks: bytearray = field(default_factory=bytearray, repr=False)
+    _samples: list[tuple[int, float, int]] = field(default_factory=list, repr=False)
+    """Times, values and marks."""
     _target: "Series | None" = field(default=None, repr=False)
 
     def add(self, time: int, value: float, target: float | None = None, mark: int | None = None) -> None:
@@ -53,11 +52,9 @@ class Series:
 
         It is marked as failed beyond a limit, or as ``mark`` says.
         """
-        if len(self._times) >= 2 * MOST_SAMPLES:
+        if len(self._samples) >= 2 * MOST_SAMPLES:
             self._thin()
-        self._times.append(time)
-        self._values.append(value)
-        self._marks.append(self._mark(value, target) if mark is None else mark)
+        self._samples.append((time, value, self._mark(value, target) if mark is None else mark))
         if target is not None:
             self.aim(time, target)
 
@@ -67,7 +64,7 @@ class Series:
         self._target.add(time, target)
 
     def clear(self) -> None:
-        self._times, self._values, self._marks, self._target = array("q"), array("d"), bytearray(), None
+        self._samples, self._target = [], None
 
     def lines(self) -> Iterator[dict[str, Any]]:
         limits = {name: finite(getattr(self, name)) for name in ("low", "high", "distance", "band")}
@@ -77,17 +74,16 @@ class Series:
             yield from self._target._parts("target")
 
     def _parts(self, key: str) -> Iterator[dict[str, Any]]:
-        while len(self._times) > MOST_SAMPLES:
+        while len(self._samples) > MOST_SAMPLES:
             self._thin()
-        for begin in range(0, len(self._times), _PART):
-            times, values = self._times[begin : begin + _PART], self._values[begin : begin + _PART]
-            zero = times[0]
+        for begin in range(0, len(self._samples), _PART):
+            times, values, marks = zip(*self._samples[begin : begin + _PART], strict=True)
             yield {
                 key: self.name,
-                "zero": zero,
-                "times": _packed(array("f", [(time - zero) / 1e6 for time in times])),
+                "zero": times[0],
+                "times": _packed(array("f", [(time - times[0]) / 1e6 for time in times])),
                 "values": _packed(array("f", values)),
-                "marks": _packed(self._marks[begin : begin + _PART]),
+                "marks": _packed(bytes(marks)),
             }
 
     def _mark(self, value: float, target: float | None) -> int:
@@ -102,19 +98,18 @@ class Series:
         return (self.low is not None and value < self.low) or (self.high is not None and value > self.high)
 
     def _thin(self) -> None:
-        kept = [n for begin in range(0, len(self._times), 4) for n in self._two_of(begin)]
-        self._times = array("q", [self._times[n] for n in kept])
-        self._values = array("d", [self._values[n] for n in kept])
-        self._marks = bytearray(self._marks[n] for n in kept)
+        """Of four neighbours the lowest and the highest stay, but one that failed before others."""
+        kept = []
+        for begin in range(0, len(self._samples), 4):
+            four = self._samples[begin : begin + 4]
+            low, high, worst = min(four, key=_value), max(four, key=_value), max(four, key=lambda each: each[2])
+            low = worst if worst[2] > max(low[2], high[2]) else low
+            kept += [each for each in four if each is low or each is high]
+        self._samples = kept
 
-    def _two_of(self, begin: int) -> list[int]:
-        """Of four neighbours the lowest and the highest, but one that failed before others."""
-        four = range(begin, min(begin + 4, len(self._times)))
-        worst = max(four, key=self._marks.__getitem__)
-        ends = [min(four, key=self._values.__getitem__), max(four, key=self._values.__getitem__)]
-        if self._marks[worst] > max(self._marks[n] for n in ends):
-            ends[0] = worst
-        return sorted({*ends})
+
+def _value(sample: tuple[int, float, int]) -> float:
+    return sample[1]
 
 
 class JudgedBoxes(NamedTuple):
@@ -204,7 +199,7 @@ def finite(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else float(value)
 
 
-def _packed(numbers: "array[float] | bytearray") -> str:
+def _packed(numbers: "array[float] | bytes") -> str:
     return base64.b64encode(bytes(numbers)).decode()
 
 
