@@ -121,14 +121,12 @@ def _infinite_number(message: Message, inside: str = "") -> str:
 def _entries(text: str, messages: MessageSet) -> Iterator[tuple[tuple[int, int | None], Producers]]:
     for word in text.split():
         message, _, names = word.partition("=")
-        name, _, stamp = message.partition("/")
-        if stamp and not stamp.isdecimal():
-            raise ValueError(f"{VARIABLE}: '{message}' has no whole number as its sender stamp")
         written = [each for each in names.split(",") if each]
         silent = frozenset(each.removesuffix("?") for each in written if each.endswith("?"))
         services = tuple(each.removesuffix("?") for each in written)
-        yield (messages.id(name), int(stamp) if stamp else None), Producers(message, services, silent)
-        if name == END_OF_INPUT:  # the same services show what may be answered
+        (key,) = _keys([message], messages)
+        yield key, Producers(message, services, silent)
+        if message == END_OF_INPUT:  # the same services show what may be answered
             yield (messages.id(NOT_SHOWN), None), Producers(NOT_SHOWN, services, silent)
 
 

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from dodo_dsl.opendlv.address import HEADER_BYTES, Address, body_length
 from dodo_dsl.opendlv.channel import Done, Step
@@ -24,13 +24,6 @@ if TYPE_CHECKING:
     from services.base.loop import Loop
 
 
-class RecordedStep(NamedTuple):
-    """All messages that a step brought to the services of a test, in order, and its time in us."""
-
-    time: int
-    messages: list[Envelope]
-
-
 class RecordedSteps:
     """Gives a LockstepClock one recorded step after the other; what the service sends goes nowhere.
 
@@ -38,7 +31,7 @@ class RecordedSteps:
     """
 
     def __init__(self, path: Path, messages: MessageSet) -> None:
-        self._steps: Iterator[RecordedStep] = read_steps(path, messages)
+        self._steps: Iterator[Step] = read_steps(path, messages)
         self._sent: Counter[Envelope] = Counter()
         self.is_over = False
 
@@ -63,10 +56,10 @@ class RecordedSteps:
         return True
 
 
-def read_steps(path: Path, messages: MessageSet) -> Iterator[RecordedStep]:
-    """The steps of a recording; raises UnjudgeableError if some are missing, and OSError."""
+def read_steps(path: Path, messages: MessageSet) -> Iterator[Step]:
+    """The steps of a recording, with all that each brought; raises UnjudgeableError if some lack, and OSError."""
     step_id, end_id = messages.id(RECORDED_STEP), messages.id(RECORDING_END)
-    step, number = RecordedStep(0, []), 0
+    step, number = Step(0, []), 0
     for envelope in read_envelopes(path):
         if envelope.received:
             continue  # as it was on the bus, where anyone can send marks
@@ -80,7 +73,7 @@ def read_steps(path: Path, messages: MessageSet) -> Iterator[RecordedStep]:
                     raise UnjudgeableError(
                         f"the recording {lacks}: it was paused, reached its largest size, or is damaged"
                     )
-                step, number = RecordedStep(mark.time, []), mark.number
+                step, number = Step(mark.time, []), mark.number
             step.messages.extend(_decoded(mark.frames))
         elif number and envelope.data_type != end_id:
             step.messages.append(envelope)

@@ -14,7 +14,7 @@ from services.base.members import SenderTable
 from services.base.service import period_of
 from services.clock.agent import TimeAgent
 from services.clock.answers import Answers, filters
-from services.clock.exchange import Patience, Roles, ServiceSilent, Timing
+from services.clock.exchange import Roles, ServiceSilent, Timing
 from services.clock.resting import SentMessages
 from services.clock.service import ClockService, OwnTime
 
@@ -36,8 +36,7 @@ def build(context: Context) -> Service:
     answering = (each.data_type for each in answers.filters)
     context.session.hear_only([*answering, *senders.ids])
     timeout = round(flags["timeout"] * MICROSECONDS)
-    patience = Patience(flags["first-patience"], flags["patience"])
-    timing = Timing(period_of(flags["freq"]), timeout, patience, flags["max-response"])
+    timing = Timing(period_of(flags["freq"]), timeout, flags["max-response"])
     return ClockService(
         context.session, socket_path(), roles, answers, timing, senders, own_time, prints=flags["prints"]
     )

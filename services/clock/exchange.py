@@ -171,8 +171,8 @@ class Roles:
 class Patience:
     """Processor time in s that the application may compute without a wait, at its start and later."""
 
-    first: float
-    others: float
+    first: float = 30.0
+    others: float = 2.0
 
 
 @dataclass(frozen=True)
@@ -181,5 +181,4 @@ class Timing:
 
     period: Fraction | int
     timeout: int
-    patience: Patience
     max_response: float | None = None

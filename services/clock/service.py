@@ -18,16 +18,13 @@ from services.base.runner import tell
 from services.base.service import Service
 from services.clock.agent import TimeAgent
 from services.clock.answers import AnsweringApplication, Answers
-from services.clock.exchange import Exchange, Roles, TestEnded, Timing
+from services.clock.exchange import Exchange, Patience, Roles, TestEnded, Timing
 from services.clock.model import Stepper
 from services.clock.printed_lines import PrintedLines
 from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
 
-_FIRST_REPORT_S, _REPORT_S, _REPORT_SHARE = 0.05, 1.0, 0.02
-"""Seconds between reports at first and later, and their share of the time that passed.
-
-A short test needs them closer, because what was measured by the wall clock is put to its time by them.
-"""
+_REPORT_S = 0.1
+"""Seconds between reports: what was measured by the wall clock is put to the test's time by them."""
 _SLICE = 0.05
 BEGIN = "dodo.TestBegin"
 
@@ -71,14 +68,13 @@ class ClockService(Service):
             assert own_time is not None, "the program gives it"
             response = ResponseTimes(float(timing.period) / MICROSECONDS, timing.max_response)
             self._application = RestingApplication(
-                answers, own_time.agent, timing.patience, exchange, self._over, response, own_time.names, self._note
+                answers, own_time.agent, Patience(), exchange, self._over, response, own_time.names, self._note
             )
             self._application.lines = self._lines
         else:
-            self._application = AnsweringApplication(answers, timing.patience, exchange, self._over)
+            self._application = AnsweringApplication(answers, Patience(), exchange, self._over)
         self._stepper = Stepper(roles, timing.period, timing.timeout, self._application, exchange, self._over)
         self._reported = self._begun = 0.0
-        self._reached = 0
         self._stopped: Callable[[], bool] = lambda: False
         self.drive = self._drive
 
@@ -119,12 +115,7 @@ class ClockService(Service):
         self._answers.take(envelope)
 
     def _over(self) -> bool:
-        if not self._begun:
-            return self._stopped()
-        now = time.monotonic()
-        is_further = self._stepper.reached != self._reached
-        period = max(_FIRST_REPORT_S, _REPORT_SHARE * (now - self._begun)) if is_further else _REPORT_S
-        if now - self._reported > min(period, _REPORT_S):
+        if self._begun and time.monotonic() - self._reported > _REPORT_S:
             self._report_time()
         return self._stopped()
 
@@ -147,9 +138,8 @@ class ClockService(Service):
         return None
 
     def _report_time(self, last: bool = False) -> None:
-        self._reported, self._reached = time.monotonic(), self._stepper.reached
-        seconds = (self._reached - EPOCH) / 1e6
-        tell("time", seconds=seconds, last=last)
+        self._reported = time.monotonic()
+        tell("time", seconds=(self._stepper.reached - EPOCH) / 1e6, last=last)
 
     def _note(self, text: str) -> None:
         tell("note", text=text)

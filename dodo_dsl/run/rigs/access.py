@@ -18,7 +18,7 @@ from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.run.process.environment import base_environment
 from dodo_dsl.run.process.slot import package_path
 from dodo_dsl.run.rigs.leases import devices_in, leased
-from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
+from dodo_dsl.run.rigs.problems import ProgramTimeout, RigProblem
 from dodo_dsl.spec.arguments import Argument, ValueProblem, convert, default_value, resolved
 from dodo_dsl.spec.manifest import Manifest, Parameter, load_manifests
 from dodo_dsl.spec.model import Spec, Use
@@ -65,7 +65,7 @@ def _answer(out: bytes, err: bytes, code: int | None) -> dict[str, Any]:
         answer: dict[str, Any] = json.loads(out)
     except ValueError:
         last = (err.decode(errors="replace").strip().splitlines() or ["no output"])[-1]
-        raise NoAnswer(f"the rig's program gave no answer: {last}") from None
+        raise RigProblem(f"the rig's program gave no answer: {last}") from None
     if "error" in answer:
         raise RigProblem(str(answer["error"]), usage=code == 2)
     return answer

@@ -11,9 +11,5 @@ class RigProblem(BackendError):
         self.usage = usage
 
 
-class NoAnswer(RigProblem):
-    """The rig's program did not run as it should, which says nothing about the rig."""
-
-
-class ProgramTimeout(NoAnswer):
+class ProgramTimeout(RigProblem):
     """The rig's program hung, as it does when the rig hangs."""

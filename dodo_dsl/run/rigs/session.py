@@ -4,9 +4,8 @@ A rig that fails the check before a test goes into quarantine.
 """
 
 import contextlib
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
-from typing import Any
 
 from dodo_dsl.plan.model import Plan, PlannedService
 from dodo_dsl.run.announce import heartbeat
@@ -17,7 +16,7 @@ from dodo_dsl.run.rigs.leases import devices_of, leased, quarantine, quarantined
 from dodo_dsl.run.rigs.ports import refuse_shared_port
 from dodo_dsl.run.rigs.problems import ProgramTimeout, RigProblem
 
-PATIENCE_S, TRIES = 90.0, 2
+PATIENCE_S = 90.0
 """s: from the far corner the rig searches its home position for 20 s, and for most of a minute if it repeats that."""
 CHECKS = {"gantry": ("services.gantry.manual", "check"), "camera": ("services.camera.health_check",)}
 """By the name of the service: the module that checks its hardware by the service's flags, and its action."""
@@ -52,9 +51,9 @@ async def _failure(plan: Plan, descriptors: tuple[int, ...]) -> str:
         flags = (flag for flag in service.flags if flag.kind == "text" and flag.name != "cid")
         words = [f"--{flag.name}={flag.value}" for flag in flags]
         try:
-            answer = await _query(("python", "-m", module), [*words, *action], descriptors)
+            answer = await query(("python", "-m", module), [*words, *action], PATIENCE_S, descriptors)
         except ProgramTimeout as timeout:
-            return f"its health check hung {TRIES} times: {timeout}"
+            return f"its health check hung: {timeout}"
         if not answer.get("ok"):
             return str(answer.get("reason") or "its health check failed")
     return ""
@@ -62,14 +61,6 @@ async def _failure(plan: Plan, descriptors: tuple[int, ...]) -> str:
 
 def _reads_a_file(service: PlannedService) -> bool:
     return any(flag.kind == "path" and flag.name == "file" for flag in service.flags)
-
-
-async def _query(program: Sequence[str], words: Sequence[str], descriptors: tuple[int, ...]) -> dict[str, Any]:
-    """The answer of a health check; one that hangs is repeated, and raises ProgramTimeout at last."""
-    for _ in range(TRIES - 1):
-        with contextlib.suppress(ProgramTimeout):
-            return await query(program, words, PATIENCE_S, descriptors)
-    return await query(program, words, PATIENCE_S, descriptors)
 
 
 @contextlib.asynccontextmanager

@@ -9,7 +9,7 @@ import pytest
 
 from dodo_dsl.run.rigs import access
 from dodo_dsl.run.rigs.access import query
-from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
+from dodo_dsl.run.rigs.problems import ProgramTimeout, RigProblem
 
 PYTHON = (sys.executable, "-c")
 
@@ -18,8 +18,8 @@ PYTHON = (sys.executable, "-c")
 @pytest.mark.parametrize(
     ("program", "kind", "sentence", "usage"),
     [
-        ("import sys; sys.exit('no such port')", NoAnswer, "the rig's program gave no answer: no such port", False),
-        ("pass", NoAnswer, "the rig's program gave no answer: no output", False),
+        ("import sys; sys.exit('no such port')", RigProblem, "the rig's program gave no answer: no such port", False),
+        ("pass", RigProblem, "the rig's program gave no answer: no output", False),
         ("""print('{"error": "it is lost"}'); raise SystemExit(1)""", RigProblem, "it is lost", False),
         ("""print('{"error": "out of range"}'); raise SystemExit(2)""", RigProblem, "out of range", True),
     ],

@@ -17,7 +17,7 @@ from dodo_dsl.opendlv.session import Session
 from services.base.members import Producers, SenderTable
 from services.clock import model
 from services.clock.answers import Answers, MessageFilter
-from services.clock.exchange import Exchange, Patience, Roles, Timing
+from services.clock.exchange import Exchange, Roles, Timing
 from services.clock.service import ClockService
 
 STEP = Fraction(100_000)
@@ -25,7 +25,7 @@ STEP = Fraction(100_000)
 
 def driven(session: Session, roles: Roles, stopped: bool = False, runner: Session | None = None) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        timing = Timing(STEP, 1_000_000, Patience(1.0, 1.0))
+        timing = Timing(STEP, 1_000_000)
         senders = SenderTable(session.messages, {}, AddressBook(Path(folder)))
         if runner:
             address_book.enter(Path(folder), "dodo-runner", runner.address)
@@ -115,7 +115,7 @@ def test_a_number_of_the_application_that_is_not_finite_is_reported_once(
         steering, pedal = (session.messages.id(name) for name in (STEERING, "opendlv.proxy.PedalPositionRequest"))
         answers = Answers((MessageFilter(STEERING, steering, 0),), (MessageFilter("pedal", pedal),))
         roles = Roles(("vehicle",), (), ("track",))
-        clock = ClockService(session, tmp_path / "clock", roles, answers, Timing(STEP, 1, Patience(1, 1)))
+        clock = ClockService(session, tmp_path / "clock", roles, answers, Timing(STEP, 1))
         clock._exchange.close()
         clock._stepper._consumed = {"track": frozenset({steering}), "vehicle": frozenset({steering})}
         clock._stepper.now += 700_000
