@@ -11,7 +11,7 @@ from typing import Literal, Protocol, Self
 
 from dodo_dsl.application import secret_variables
 from dodo_dsl.outcome import NotRun, Outcome
-from dodo_dsl.plan.added_services import PICTURES_FILE, RECORDING
+from dodo_dsl.plan.added_services import PICTURES_FILE
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
@@ -209,9 +209,6 @@ class Runner:
                 engine = Engine(chosen.plan, backend, say, stands, forget_pictures)
                 outcome, kept = await engine.run(self.keep)
                 self.kept.extend(kept)
-                if engine.state.finding.cause == "silence" and not self.keep:
-                    why = await asyncio.to_thread(_silent, job)
-                    outcome = replace(outcome, reason="; ".join(filter(None, (outcome.reason, why))))
                 if job.plan.pool:
                     outcome = replace(outcome, notes=(*outcome.notes, f"ran on rig '{chosen.plan.rig}'"))
         except Exception as error:  # noqa: BLE001  (whatever it is, it concerns this test alone)
@@ -249,16 +246,6 @@ def _signals_call(react: Callable[[], None]) -> Iterator[None]:
 
 def _now() -> float:
     return asyncio.get_running_loop().time()
-
-
-def _silent(job: Job) -> str:
-    """Which program of the application is to blame that it did not answer; empty if that is not known."""
-    from dodo_dsl.opendlv.odvd import OdvdError
-    from dodo_dsl.run.test_recording import silent_consumer
-
-    with contextlib.suppress(OSError, OdvdError):
-        return silent_consumer(job.plan, job.folder, job.report / RECORDING)
-    return ""
 
 
 def is_undecided(outcome: Outcome) -> bool:

@@ -1,6 +1,5 @@
-"""What a recording says of its test: clock and duration, and which program got messages of another and sent none."""
+"""What a recording says of its test: clock and duration."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -8,14 +7,11 @@ from typing import Self
 
 import numpy as np
 
-from dodo_dsl.emit.output_folder import FILES
-from dodo_dsl.opendlv import recording_times, regular_file
+from dodo_dsl.opendlv import recording_times
 from dodo_dsl.opendlv.envelope import MICROSECONDS, Envelope
-from dodo_dsl.opendlv.frame_table import Fact
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import OWN_IDS, MessageSet
-from dodo_dsl.opendlv.recording import Recording, RecordingError, Scanner
-from dodo_dsl.plan.model import ApplicationService, Plan
+from dodo_dsl.opendlv.recording import Recording, RecordingError
 
 _AROUND = 60 * MICROSECONDS
 """How far a message may lie behind the end of a recording."""
@@ -143,49 +139,3 @@ def _last_mark(recording: Recording, id_: int) -> Envelope | None:
 
 def _seconds(time: int) -> float:
     return max(0, time) / MICROSECONDS
-
-
-def _came(recording: Path) -> Numbers:
-    """Ids, times of receipt in us, and sender stamps of all messages: (3, messages)."""
-    parts = [np.empty((3, 0), np.int64)]
-    with regular_file.opened(recording) as stream:
-        for batch in Scanner(stream).batches():
-            parts.append(np.stack((batch.table[Fact.DATA_TYPE], batch.times[1], batch.table[Fact.SENDER_STAMP])))
-    found: Numbers = np.concatenate(parts, axis=1)
-    return found
-
-
-def _of(message: str, came: Numbers, messages: MessageSet) -> Numbers:
-    """Those of a message, under any sender stamp if it names none."""
-    name, _, stamp = message.partition("/")
-    is_known = name in messages.names()
-    chosen = (came[0] == messages.id(name)) & (not stamp or came[2] == int(stamp)) if is_known else []
-    found: Numbers = came[:, chosen]
-    return found
-
-
-def silent_consumer(plan: Plan, folder: Path, recording: Path) -> str:
-    """The first program that got messages and sent none, in half a sentence, or empty; ``folder`` is the test's.
-
-    Raises OSError and OdvdError.
-    """
-    came, messages = _came(recording), MessageSet.load(*(folder / FILES / path for path in plan.messages))
-    services = plan.application.services
-    for consumer in services:
-        if consumer.outputs and not any(_of(message, came, messages).size for message in consumer.outputs):
-            for message in consumer.inputs:
-                producer = _producer(message, [s for s in services if s is not consumer])
-                if producer and _of(message, came, messages).size:
-                    return f"{message} came from '{producer}', but '{consumer.name}', which consumes it, sent nothing"
-    return ""
-
-
-def _producer(message: str, services: Sequence[ApplicationService]) -> str:
-    """The service that declares a message, under any sender stamp where one of both names none; empty if none does."""
-    name, _, stamp = message.partition("/")
-    for service in services:
-        for output in service.outputs:
-            its_name, _, its_stamp = output.partition("/")
-            if its_name == name and (its_stamp == stamp or not its_stamp or not stamp):
-                return service.name
-    return ""

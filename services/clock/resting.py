@@ -177,7 +177,7 @@ class RestingApplication:
         self._gone: frozenset[int] = frozenset()
 
     def facts(self) -> dict[str, Any]:
-        for camera in sorted(self._unread):
+        for camera in sorted(self._unread if self.frames else ()):
             self._note_once(f"no program of the application waited for a frame of '{camera}'")
         facts = self.response.facts()
         return facts and {**facts, "uncopied": self.answers.uncopied}

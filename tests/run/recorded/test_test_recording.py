@@ -5,12 +5,9 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import RecordingError
-from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.run.test_recording import NoTestRecording, inspect, silent_consumer
+from dodo_dsl.run.test_recording import NoTestRecording, inspect
 from tests.run.recorded.made import EPOCH, begin, message, step, write
-from tests.run.scripted import plan
 
 PEDAL = "opendlv.proxy.PedalPositionRequest"
 WALL = 1_790_000_000_000_000
@@ -112,30 +109,3 @@ def test_bytes_that_are_no_message_are_told_but_at_the_end(tmp_path: Path) -> No
     assert not inspect(path).fault
     path.write_bytes(whole[:100] + b"\x0d\xa4" + whole[100:])
     assert inspect(path).fault.startswith("skipped ")
-
-
-STEERING = "opendlv.proxy.GroundSteeringRequest"
-STATUS = "opendlv.system.SystemStatusMessage"
-TOLD = f"{STATUS} came from 'lane', but 'driver', which consumes it, sent nothing"
-
-
-@pytest.mark.parametrize(
-    ("consumed", "came", "told"),
-    [
-        (STATUS, [STATUS], TOLD),
-        (f"{STATUS}/0", [STATUS], TOLD.replace(STATUS, f"{STATUS}/0")),
-        (f"{STATUS}/2", [STATUS], ""),
-        (STATUS, [], ""),
-        (STATUS, [STATUS, STEERING], ""),
-        (STEERING, [STEERING], ""),
-        ("team.Unknown", [STATUS], ""),
-    ],
-)
-def test_the_consumer_of_what_came(tmp_path: Path, consumed: str, came: list[str], told: str) -> None:
-    services = (
-        ApplicationService("lane", outputs=(STATUS, "team.Unknown")),
-        ApplicationService("driver", inputs=(consumed,), outputs=(STEERING,)),
-    )
-    rec = write(tmp_path / "test.rec", begin(), *(message(name, 1, 1) for name in came))
-    assert set(came) <= set(MessageSet.standard().names())
-    assert silent_consumer(plan(application=Application(".", services)), tmp_path, rec) == told
