@@ -56,42 +56,23 @@ class NoValue(ValueError):
 
 def value(type_: str, text: bytes) -> Any:
     """The value of a field of a type of messages; raises NoValue."""
-    if type_ in ("float", "double"):
-        return _float(type_, text)
-    if type_ == "char":
-        if len(text) != 1:
-            raise NoValue("no single character")
-        return text[0]
-    if type_ in INTEGER_BITS:
-        if not _INTEGER.fullmatch(text):
-            raise NoValue("no whole number")
-        if int(text) not in integer_range(type_):
-            raise NoValue(f"out of range for {type_}")
-        return int(text)
-    if type_ == "bool":
-        if text.lower() not in _BOOLEANS:
-            raise NoValue("neither true nor false")
-        return _BOOLEANS[text.lower()]
-    if type_ == "string":
-        try:
-            return text.decode()
-        except UnicodeDecodeError:
-            raise NoValue("no UTF-8") from None
-    return text
-
-
-def _float(type_: str, text: bytes) -> float:
-    if not _NUMBER.fullmatch(text):
-        raise NoValue("no number")
-    found = float(text)
-    is_meant = b"i" in text.lower()  # inf, infinity
     try:
-        struct.pack("<f" if type_ == "float" else "<d", found)
-    except OverflowError:
-        raise NoValue(f"out of range for {type_}") from None
-    if math.isinf(found) and not is_meant:
-        raise NoValue(f"out of range for {type_}")
-    return found
+        if type_ in ("float", "double") and _NUMBER.fullmatch(text):
+            struct.pack("<f" if type_ == "float" else "<d", found := float(text))
+            if not math.isinf(found) or b"i" in text.lower():  # inf, infinity
+                return found
+        elif type_ == "char":
+            (found,) = text
+            return found
+        elif type_ in INTEGER_BITS and _INTEGER.fullmatch(text) and int(text) in integer_range(type_):
+            return int(text)
+        elif type_ == "bool":
+            return _BOOLEANS[text.lower()]
+        elif type_ in ("string", "bytes"):
+            return text.decode() if type_ == "string" else text
+    except (OverflowError, KeyError, ValueError):  # UnicodeDecodeError is a ValueError, too
+        pass
+    raise NoValue(f"not a valid {type_}")
 
 
 def sample_time(unit: str, text: bytes) -> int:
