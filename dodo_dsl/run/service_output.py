@@ -62,7 +62,7 @@ class ServiceOutput:
         self._times, self._begin = LogTimes(log), os.fstat(self._log.fileno()).st_size
         self._on_line = on_line
         self._written = self._lines = 0
-        self._rest = b""
+        self._rest = self._handed = b""
         self._skipping = False
         self._tail: deque[bytes] = deque(maxlen=_TAIL_LINES)
         self._is_cooked = is_cooked
@@ -119,7 +119,11 @@ class ServiceOutput:
         *lines, self._rest = data.split(b"\n")
         if self._is_cooked:
             lines = [line.removesuffix(b"\r") for line in lines]
-        self._hand(lines)
+        if lines and self._handed:  # as a line without its end: it does not count once more
+            is_handed, self._handed = lines[0].rstrip(b"\r") == self._handed, b""
+            self._hand(lines[1:] if is_handed else lines)
+        else:
+            self._hand(lines)
         self._write(b"".join(line + b"\n" for line in lines if self._take(line)))
         if len(self._rest) > _MAX_LINE:
             if not self._skipping:
@@ -161,7 +165,7 @@ class ServiceOutput:
         os.close(self._reader)
         self._reader = -1
         if self._rest:
-            self._hand([self._rest])
+            self._hand([self._rest] if self._rest != self._handed else [])
             if self._take(self._rest):
                 self._write(self._rest)
         if self._matching.done():
@@ -185,7 +189,7 @@ class ServiceOutput:
             asyncio.get_running_loop().add_reader(self._reader, self._read)
 
     async def read_empty(self) -> bool:
-        """Has all matched that was printed until now, as its program rests.
+        """Has all matched that was printed until now, and a line without its end, as its program rests.
 
         Whether so much came that the program may only wait for room in the terminal. Raises TimeoutError where another
         terminal says nothing.
@@ -194,8 +198,11 @@ class ServiceOutput:
             await self._hear_echo(self.type_in)
         while await self._is_matched() and self.type_in is None and self._read_bytes < _ENOUGH and self._read():
             pass
-        await self._is_matched()
         is_full, self._read_bytes = self._read_bytes >= _FULL, 0
+        if await self._is_matched() and self._rest not in (b"", self._handed) and not (is_full or self._skipping):
+            self._handed = self._rest
+            self._hand([self._rest])
+            await self._is_matched()
         return is_full
 
     async def _is_matched(self) -> bool:
