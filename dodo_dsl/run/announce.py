@@ -41,10 +41,7 @@ def hearers(plan: Plan) -> list[str]:
 
 @contextlib.asynccontextmanager
 async def heartbeat(cid: int, channel: Path) -> AsyncIterator[None]:
-    """Within the block, sends ``dodo.Alive`` each second to a session of this machine; raises OSError.
-
-    Services know by the folder ``channel`` from where it comes.
-    """
+    """Within the block, sends ``dodo.Alive`` each second to a session of this machine; raises OSError."""
     relay = Relay(cid, channel, HEARTBEAT)
     task = asyncio.ensure_future(_beat(relay))
     try:

@@ -1,8 +1,4 @@
-"""What gives an application the test's time in lockstep: built where it is not yet, and who cannot have it.
-
-It is a library that is preloaded into the application's processes, and an agent that lets their time go on; their C
-sources are in ``services/clock/native``.
-"""
+"""What gives an application the test's time in lockstep, a preloaded library and an agent, and who cannot have it."""
 
 import contextlib
 import fcntl

@@ -202,10 +202,7 @@ def _may_send(service: PlannedService, message: str) -> bool:
 
 
 def memory_taken(event: MemoryTaken) -> Finding:
-    """The end of a test whose application, the reader, keeps one of the test's services from its shared memory.
-
-    No machine is so busy that a copy takes as long as a service waits for the lock.
-    """
+    """The end of a test whose application keeps a shared memory's lock: no busy machine takes as long."""
     reason = f"the application keeps service '{event.service}' from its shared memory: {event.text}"
     return Finding("failed", reason, event.service)
 

@@ -1,7 +1,4 @@
-"""What services report to the runner: JSON over the channel of a test, or lines of output where they do not reach it.
-
-Such a line is an object with the key ``dodo``; everything else that services print is log.
-"""
+"""What services report to the runner: JSON over the channel of a test, or lines of output by hand."""
 
 import asyncio
 import contextlib

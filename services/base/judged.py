@@ -1,8 +1,4 @@
-"""What an evaluator judged over time, for the report to draw: values with limits and targets, boxes, and the path.
-
-It decides nothing. In a test that DoDo runs the runner gets it as lines of JSON, each below 64 KiB, before the verdict,
-and keeps them next to the service's log. A service that is started by hand prints none.
-"""
+"""What an evaluator judged over time, for the report to draw, as lines of JSON below 64 KiB; it decides nothing."""
 
 import base64
 import json
@@ -48,10 +44,7 @@ class Series:
     _target: "Series | None" = field(default=None, repr=False)
 
     def add(self, time: int, value: float, target: float | None = None, mark: int | None = None) -> None:
-        """A sample at a time in us of the test, as handlers and updates have it, with its target where there is one.
-
-        It is marked as failed beyond a limit, or as ``mark`` says.
-        """
+        """A sample at a time in us of the test, with its target; it failed beyond a limit, or as ``mark`` says."""
         if len(self._samples) >= 2 * MOST_SAMPLES:
             self._thin()
         self._samples.append((time, value, self._mark(value, target) if mark is None else mark))

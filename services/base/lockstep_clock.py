@@ -36,10 +36,7 @@ _LONGEST_POLL_S = 0.002
 
 
 class AnnouncedMemory(SharedMemory):
-    """Shared memory that holds back the next picture until it is announced, so that nobody reads it too early.
-
-    ``sampled`` is when that picture was sampled, in microseconds since the epoch.
-    """
+    """Shared memory that holds back the next picture, ``sampled`` at a time in us, until it is announced."""
 
     def __init__(self, segment: Segment | PosixSegment, name: str, owner: bool) -> None:
         super().__init__(segment, name, owner)
@@ -101,10 +98,7 @@ class Observer:
         self._collected.append(envelope)
 
     def deliver(self, inbox: "Loop", until: int, relayed: Sequence[Envelope]) -> None:
-        """Deliver all of a step (its end ``until`` in us), after the application's answer to the one before.
-
-        The answer to this one, and what belongs to later ones, waits: whether it is there already is chance.
-        """
+        """Deliver all of a step (its end ``until`` in us). The answer to it waits: whether it is there is chance."""
         own = [envelope for envelope in relayed if not envelope.received]
         self._relayed.append({_key(envelope) for envelope in own})
         collected, self._collected = self._collected, []
@@ -158,10 +152,7 @@ class StepMarks:
 
 
 class LockstepClock(Clock):
-    """Test time in the clock service's steps, or a recording's; ``name`` is the service's name in the test.
-
-    ``readers`` are expected to wait for pictures of all its memories together.
-    """
+    """Test time in the clock service's steps, or a recording's; ``readers`` wait for pictures of all memories."""
 
     relays = True
 
@@ -256,10 +247,7 @@ class LockstepClock(Clock):
         return memory
 
     def close(self, stopped: Callable[[], bool]) -> None:
-        """The service ends: answer the open step.
-
-        Its memories stay until the test is over, as removing them would show the last picture once more.
-        """
+        """Answer the open step. Memories stay until the test is over, else the last picture were shown once more."""
         if self._open:
             self._answer(ended=True)
         self._source.close()

@@ -109,10 +109,7 @@ class Loop:
         self._world = World.load(self.session.messages)
 
     def run(self, stopped: Callable[[], bool]) -> None:
-        """Until the service is done, or ``stopped`` by a signal.
-
-        The memories of a source stay until it is stopped, as the application may read them until all have judged.
-        """
+        """Until the service is done, or ``stopped``; memories of a source stay until all have judged."""
         try:
             self._run(stopped)
         except UnjudgeableError as error:
@@ -172,10 +169,7 @@ class Loop:
             self.service.observe(envelope)
 
     def handle(self, envelope: Envelope) -> None:
-        """For the clock: let the service handle an envelope; one that cannot be decoded is logged and ignored.
-
-        An observer gets one that does not count, too, as if it had never been received, as when it is judged again.
-        """
+        """For the clock: let the service handle an envelope; an observer gets one that does not count, too."""
         counts = self.members is None or self.members.admits(envelope)
         if not self.clock.relays and self.service.observe is not None:
             self.service.observe(envelope if counts else envelope._replace(received=0))

@@ -1,8 +1,4 @@
-"""The services of a test: their addresses, who may send what, and what the application must not hear.
-
-Each enters its address in a folder that the application does not have. From there it sends, and there it gets, in real
-time, what the application must not hear. The table of who may send which message is the compiler's, of the wiring.
-"""
+"""The services of a test: their addresses, who may send what, and what the application must not hear."""
 
 import math
 import os
@@ -204,10 +200,7 @@ _UNATTENDED_S = 10.0
 
 
 class Members:
-    """Separates the messages of the test's services from the application's, and sends to them alone.
-
-    A service enters its address before it sends, and the application starts when all are ready.
-    """
+    """Separates the messages of the test's services from the application's, and sends to them alone."""
 
     def __init__(self, session: Session, name: str, table: SenderTable, world: World | None = None) -> None:
         self._session, self._name, self._table, self._book = session, name, table, table.book

@@ -1,7 +1,4 @@
-"""A service as a process: flags, log, signals, readiness, and its exit code.
-
-Signals also end a service that is being built, which may wait for hardware.
-"""
+"""A service as a process: flags, log, signals, readiness, and its exit code."""
 
 import logging
 import os

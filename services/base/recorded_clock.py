@@ -1,7 +1,4 @@
-"""The clock for a recording: its steps where it has them, else its messages by when they were received.
-
-Recorded steps take the place of the link to the clock. The session of services that judge a recording is without a bus.
-"""
+"""The clock for a recording: its steps where it has them, else its messages by when they were received."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -25,10 +22,7 @@ if TYPE_CHECKING:
 
 
 class RecordedSteps:
-    """Gives a LockstepClock one recorded step after the other; what the service sends goes nowhere.
-
-    The service does not hear what it sent itself in the test, so messages that it sends again are left out.
-    """
+    """Gives a LockstepClock recorded steps, without what the service sent itself and so did not hear."""
 
     def __init__(self, path: Path, messages: MessageSet) -> None:
         self._steps: Iterator[Step] = read_steps(path, messages)

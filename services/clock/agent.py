@@ -1,7 +1,4 @@
-"""The agent that lets the time of the application go on (``native/agent.c``), over its two FIFOs.
-
-It says when all threads of the application wait for later. In a container the application may write there, too.
-"""
+"""The agent over its two FIFOs (``native/agent.c``). In a container the application may write there, too."""
 
 import os
 import select

@@ -1,7 +1,4 @@
-"""The application that keeps the machine's time, as programs do that cannot load DoDo's library: it answers each frame.
-
-A frame, or where there is none a step, is answered when all messages came that it is to answer with.
-"""
+"""The application that keeps the machine's time: it is awaited by its answers to each frame, or step."""
 
 import time
 from collections import Counter
@@ -191,10 +188,7 @@ class AnsweringApplication:
             self._link.pump(SLICE_S, [camera])
 
     def await_answer(self, until: int) -> None:
-        """Wait for the answer to what was shown, whenever (``until``) the next step is.
-
-        Raises ApplicationSilent and ApplicationFloods.
-        """
+        """Wait for the answer to what was shown; raises ApplicationSilent and ApplicationFloods."""
         while not (self._stopped() or not self._is_shown or self._is_answered):
             if self._left <= 0:
                 raise ApplicationSilent(self._sentence(self._missing), silent=self.answers.is_silent)

@@ -1,7 +1,4 @@
-"""Commands of the clock to the services of a test, and how a test can end.
-
-They and their results go over the channel; the application's messages come on the bus.
-"""
+"""Commands of the clock to the services of a test over their channels, and how a test can end."""
 
 import select
 import time
@@ -20,10 +17,7 @@ from services.base.members import SenderTable
 
 
 class Exchange:
-    """Commands the ``services``; messages of all others on the bus go to ``take``, if ``senders`` let them send those.
-
-    It listens at ``path`` until all services have connected.
-    """
+    """Commands the ``services``; messages of others on the bus go to ``take``, if ``senders`` let them send those."""
 
     def __init__(
         self,
@@ -122,10 +116,7 @@ SLICE_S = 0.05
 
 
 class TestEnded(Exception):
-    """The test cannot go on; one sentence. ``kind`` names the reason to the runner.
-
-    ``silent`` means that nothing came of the application.
-    """
+    """The test cannot go on. ``kind`` names the reason; ``silent``: nothing came of the application."""
 
     kind = ""
 

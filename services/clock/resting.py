@@ -1,8 +1,4 @@
-"""The application whose own time is the test's: the world waits until it rests.
-
-The agent lets it run up to a time of the test, and says when all its threads wait for later. What the application sends
-counts at the time at which it sent it. Computing takes none; how much it computes is measured all the same.
-"""
+"""The application whose own time is the test's: the agent lets it run up to a time, and says when it rests."""
 
 import statistics
 import time
@@ -45,10 +41,7 @@ _MOST_NOTES = 64
 
 @dataclass
 class SentMessages:
-    """Collects all that the application sends and services consume, those of ``heard``.
-
-    Messages under other sender stamps are passed on, too, as services count them.
-    """
+    """Collects all that the application sends and services consume, under any sender stamp, as they count those."""
 
     heard: tuple[MessageFilter, ...]
     answers: int = 0
@@ -145,10 +138,7 @@ def processor_name(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
 
 
 class RestingApplication:
-    """Lets the application go on from step to step, and shows pictures when they are due; ``frames`` counts steps.
-
-    ``names`` are those of its services, by which the agent numbers them, and ``note`` takes notes on the test.
-    """
+    """Lets the application go on from step to step, and shows pictures when they are due; ``frames`` counts steps."""
 
     def __init__(
         self,

@@ -51,10 +51,7 @@ class ClockService(Service):
         *,
         prints: bool = False,
     ) -> None:
-        """Services connect at ``path``. With ``own_time``, which SentMessages have, the application rests.
-
-        ``prints`` is whether it prints messages.
-        """
+        """Services connect at ``path``. With ``own_time`` the application rests; ``prints``: it prints messages."""
         self._session = session
         self._begin_id = session.messages.id(BEGIN)
         self._senders = senders or SenderTable(session.messages)

@@ -111,10 +111,7 @@ class LinkAnswers(NamedTuple):
 
 
 class Link:
-    """Commands the rig over a line that it opens; ``name`` names the line in errors.
-
-    It sends nothing on its own, so that a fault can still be read when the line is opened.
-    """
+    """Commands the rig over a line that it opens. It sends nothing on its own, so that a fault can be read first."""
 
     def __init__(self, name: str, conversion: Conversion | None = None) -> None:
         """The line is opened by the first exchange. Positions that it gives are true ones."""
@@ -151,10 +148,7 @@ class Link:
         return answers._replace(refusals=(*(a for a in late if isinstance(a, Refusal)), *answers.refusals))
 
     def close(self) -> None:
-        """Stop the rig, wait for its confirmation as far as the line allows, and close the line.
-
-        A rig that a fault has stopped is left alone: STOP would acknowledge the fault.
-        """
+        """Stop the rig and close the line; one that a fault has stopped is left alone, as STOP would erase the fault."""
         reason = "it does not answer"
         try:
             port, self._port = self._port or SerialPort(self.name), None

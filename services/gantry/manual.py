@@ -56,10 +56,7 @@ def read_state(link: Link) -> tuple[Position | None, Status]:
 
 
 def run_checks(link: Link, kept: Mapping[str, float], patience: float) -> None:
-    """The rig finds its home, its memory gets the limits ``kept``, and it answers in time.
-
-    Raises RigError, why it is unfit, also for a rig that still reports an old fault.
-    """
+    """Finds home, writes the limits ``kept`` and times the answers; raises RigError, why the rig is unfit."""
     start.settle(link, start.find(link))
     memory.agree(link, kept, write=True)
     start.calibrate(link, patience)
@@ -172,10 +169,7 @@ def _done(flags: Flags, action: str, goal: Position | None, kept: Mapping[str, f
 
 
 def _where(link: Link) -> dict[str, Any]:
-    """Status and true limits; after homing the true place, and the counters' full steps.
-
-    Yaw is in degrees but in ``limits``, which are those that the rig's memory has.
-    """
+    """Status and true limits (yaw in rad); after homing the place (yaw in degrees) and the counters' full steps."""
     at, status = read_state(link)
     return {
         "status": int(status),

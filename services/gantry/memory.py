@@ -1,7 +1,4 @@
-"""A rig's limits by the gantry's flags: true ones for what moves it, and its firmware's in the rig's memory.
-
-Those in the memory are read and, if needed, written before anything moves.
-"""
+"""A rig's limits by the gantry's flags: true ones for what moves it, and its firmware's in the rig's memory."""
 
 import logging
 import math

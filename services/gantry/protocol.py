@@ -80,10 +80,7 @@ Answer = Position | Status | Refusal | Limits
 
 
 def command(word: Word, *arguments: float) -> bytes:
-    """A command as its line; numbers have six decimals, as many as the firmware reads.
-
-    Raises ValueError for one that is not finite.
-    """
+    """A command as its line, numbers with six decimals; raises ValueError for one that is not finite."""
     if not all(map(math.isfinite, arguments)):
         raise ValueError(f"{word} takes finite numbers, not {', '.join(map(str, arguments))}")
     numbers = ",".join(f"{round(a, 6) + 0.0:.6f}" for a in arguments)

@@ -166,10 +166,7 @@ def describe(status: Status) -> str:
 
 
 def opened(flags: Flags, resources: ExitStack) -> tuple[Link, EmulatedRig | None]:
-    """The line to the rig, which is stopped when it is closed, and the emulated rig if that is one.
-
-    Raises PortError and RigError.
-    """
+    """The line to the rig, which it stops when closed, and the emulated rig; raises PortError and RigError."""
     emulated = resources.enter_context(EmulatedRig(kind=flags["kind"])) if flags["serial"] == EMULATED else None
     link = Link(checked(emulated.port if emulated else flags["serial"]), conversion=conversion_of(flags))
     resources.callback(link.close)

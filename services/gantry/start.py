@@ -28,10 +28,7 @@ def find(link: Link) -> Status:
 
 
 def settle(link: Link, status: Status) -> None:
-    """Stop the rig, and acknowledge that it braked or restarted before.
-
-    Raises RigError for a fault, which only a manual CALIBRATE ends.
-    """
+    """Stop the rig, and acknowledge that it braked; raises RigError for a fault, which only CALIBRATE ends."""
     if status in LATCHED:
         raise RigError(trouble(link, status))
     give(link, Word.STOP)

@@ -1,7 +1,4 @@
-"""Manual access to a rig and its camera through their programs, while nobody else uses the rig.
-
-A rig's settings become flags of the programs that move it.
-"""
+"""Manual access to a rig and its camera through their programs, while nobody else uses the rig."""
 
 import asyncio
 import contextlib
@@ -84,10 +81,7 @@ async def _end(process: asyncio.subprocess.Process) -> None:
 
 
 def ask(command: Command, cid: int | None, user: str, say: Callable[[str], None], patience_s: float) -> dict[str, Any]:
-    """The answer of a rig's program, while nobody else uses the rig; a signal ends it.
-
-    ``user`` names the holder of the leases to others. Raises LeaseTimeout and RigProblem.
-    """
+    """The answer of a rig's program, while nobody else uses the rig; raises LeaseTimeout and RigProblem."""
 
     async def asked() -> dict[str, Any]:
         task = asyncio.current_task()

@@ -80,10 +80,7 @@ async def leased(
     patience_s: float = leases.DEFAULT_PATIENCE_S,
     devices: Sequence[str] = (),
 ) -> AsyncIterator[tuple[int, ...]]:
-    """Holds the leases that tests on the rig take, too: of its CID and its devices. The emulated rig has neither.
-
-    Gives the descriptors by which a program holds them, too. Raises LeaseTimeout when one does not come free.
-    """
+    """Holds the leases of a rig's CID and devices, and gives their descriptors; raises LeaseTimeout."""
     with contextlib.ExitStack() as held:
         descriptors = []
         for name in [*([] if cid is None else [f"cid-{cid}"]), *device_keys(devices)]:

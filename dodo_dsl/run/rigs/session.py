@@ -1,7 +1,4 @@
-"""What the runner does about a real rig during a test: leases, health check and heartbeat.
-
-A rig that fails the check before a test goes into quarantine.
-"""
+"""What the runner does about a real rig during a test: leases, health check and heartbeat."""
 
 import contextlib
 from collections.abc import AsyncIterator, Callable
@@ -23,11 +20,7 @@ CHECKS = {"gantry": ("services.gantry.manual", "check"), "camera": ("services.ca
 
 
 async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int, ...]) -> None:
-    """Checks the real rig of a test; one that fails goes into quarantine.
-
-    Raises BackendError when the rig is in quarantine, fails, or cannot be checked. ``descriptors`` are those of the
-    rig's leases, which the check goes on to hold if this process is killed.
-    """
+    """Checks the real rig of a test, under its leases; one that fails goes into quarantine. Raises BackendError."""
     try:
         devices = devices_of(plan)
         reason = quarantined(plan.rig, devices)
@@ -69,11 +62,7 @@ async def attended(
     slot: Slot,
     say: Callable[[str], None],
 ) -> AsyncIterator[tuple[int, ...]]:
-    """Leases and checks a real rig's devices, and sends a heartbeat within the block; does nothing for other tests.
-
-    Gives all descriptors by which a program holds the rig, with those of the ``slot``. Raises BackendError when the rig
-    is in use, in quarantine, or fails its check.
-    """
+    """Leases and checks a real rig, with a heartbeat, within the block; gives all descriptors. Raises BackendError."""
     if not plan.is_real:
         yield slot.descriptors
         return
