@@ -148,7 +148,7 @@ class Link:
         return answers._replace(refusals=(*(a for a in late if isinstance(a, Refusal)), *answers.refusals))
 
     def close(self) -> None:
-        """Stop the rig and close the line; one that a fault has stopped is left alone, as STOP would erase the fault."""
+        """Stop the rig and close the line; one that a fault has stopped is left alone: STOP would erase the fault."""
         reason = "it does not answer"
         try:
             port, self._port = self._port or SerialPort(self.name), None
