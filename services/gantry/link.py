@@ -92,7 +92,6 @@ SILENCE = 1.0
 """s without an answer after which a line counts as lost."""
 PATIENCE = 5.0
 """s that a rig has to answer at first: an Arduino that was plugged in needs two."""
-RETRY = 0.25
 STOP_TRIES, STOP_PATIENCE = 3, 0.2
 REQUEST_STATE = command(Word.POSITION) + command(Word.STATUS)
 
@@ -114,37 +113,42 @@ class Link:
     """Commands the rig over a line that it opens. It sends nothing on its own, so that a fault can be read first."""
 
     def __init__(self, name: str, conversion: Conversion | None = None) -> None:
-        """The line is opened by the first exchange. Positions that it gives are true ones."""
+        """Positions that it gives are true ones. Raises PortError when the line cannot be opened."""
         self.name = name
         self.conversion = conversion or Conversion()
-        self._port: SerialPort | None = None
+        try:
+            self._port: SerialPort | None = SerialPort(name)
+        except OSError as error:
+            reason = error.strerror or error
+            raise PortError(f"the line to the rig at {name} cannot be opened: {reason}") from None
         self._lines = LineReader()
-        self._last_state = self._retry = time.monotonic()
+        self._last_state = time.monotonic()
         self._found = False
         self._status: Status | None = None
 
     def exchange(self, lines: bytes, patience: float) -> LinkAnswers:
         """Send commands of which STATUS is the last, and wait up to ``patience`` s for its answer.
 
-        A rig that has not answered yet has PATIENCE to do so, without answers meanwhile. From its first answer on:
-        RigError when the line is lost or silent for SILENCE. Raises PortError when the line cannot be
-        opened.
+        Raises RigError when the line is lost, or silent for SILENCE, or for PATIENCE before its first answer.
         """
         try:
-            if self._port is None and not self._opened():
-                return LinkAnswers()
-            assert self._port is not None
+            if self._port is None:
+                raise OSError("it was lost before")  # noqa: TRY301
             late = self._lines.feed(self._port.read(0.0))
             if lines != REQUEST_STATE:
                 self._status = None
             self._port.write(lines)
             answers = self._answers(self._port, patience)
         except OSError as error:
-            self._let_go()
-            self._miss(error.strerror or str(error))
-            return LinkAnswers()
-        if time.monotonic() - self._last_state > SILENCE:
-            self._miss("it does not answer")
+            if self._port is not None:
+                self._port.close()
+                self._port = None
+            raise RigError(f"the line to the rig at {self.name} is lost: {error.strerror or error}") from None
+        silence = time.monotonic() - self._last_state
+        if self._found and silence > SILENCE:
+            raise RigError(f"the line to the rig at {self.name} is lost: it does not answer")
+        if silence > PATIENCE:
+            raise RigError(f"the rig at {self.name} gave no answer for {PATIENCE:g} s")
         return answers._replace(refusals=(*(a for a in late if isinstance(a, Refusal)), *answers.refusals))
 
     def close(self) -> None:
@@ -178,30 +182,3 @@ class Link:
                 else:
                     refusals.append(answer)
         return LinkAnswers(at, status, tuple(refusals), limits)
-
-    def _opened(self) -> bool:
-        now = time.monotonic()
-        if now < self._retry:
-            return False
-        self._retry = now + RETRY
-        try:
-            self._port, self._lines = SerialPort(self.name), LineReader()
-        except OSError as error:
-            if now - self._last_state > PATIENCE:
-                raise PortError(
-                    f"the line to the rig at {self.name} cannot be opened: {error.strerror or error}"
-                ) from None
-            return False
-        return True
-
-    def _miss(self, reason: str) -> None:
-        """The line is lost, or has not been found yet."""
-        if self._found:
-            raise RigError(f"the line to the rig at {self.name} is lost: {reason}")
-        if time.monotonic() - self._last_state > PATIENCE:
-            raise RigError(f"the rig at {self.name} gave no answer for {PATIENCE:g} s: {reason}")
-
-    def _let_go(self) -> None:
-        if self._port is not None:
-            self._port.close()
-            self._port = None

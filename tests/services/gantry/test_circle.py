@@ -19,31 +19,29 @@ LIMITS = MotionLimits(low=LOW, high=HIGH)
 
 
 @pytest.fixture
-def line(tmp_path: Path) -> Iterator[tuple[FakeRig, Link]]:
+def rig(tmp_path: Path) -> Iterator[FakeRig]:
     with FakeRig(tmp_path / "rig") as rig:
         rig.turn = True
-        link = Link(str(rig.path), conversion=Conversion(circle=True))
-        yield rig, link
-        link.close()
+        yield rig
 
 
 @pytest.mark.parametrize("circle", [True, False])
-def test_another_firmware_is_refused_before_anything_moves(line: tuple[FakeRig, Link], circle: bool) -> None:
-    rig, link = line
+def test_another_firmware_is_refused_before_anything_moves(rig: FakeRig, circle: bool) -> None:
+    link = Link(str(rig.path), conversion=Conversion(circle=True))
     memory.read_memory(link)
     rig.turn = circle
     link.conversion = Conversion(circle=not circle)
     with pytest.raises(RigError, match=f"is {'' if circle else 'not '}that of the kind circle: flash gantry"):
         memory.read_memory(link)
     assert {word for word, _ in rig.received} == {"LIMITS", "STATUS"}
+    link.close()
 
 
 @pytest.mark.parametrize("action", [("goto", "0", "0", "0"), ("calibrate",), ("check",), ("home",)])
 @pytest.mark.parametrize(("turn", "kind"), [(True, ()), (False, ("--kind=circle",))])
 def test_by_hand_nothing_moves_a_rig_with_the_firmware_of_the_other_kind(
-    line: tuple[FakeRig, Link], turn: bool, kind: tuple[str, ...], action: tuple[str, ...]
+    rig: FakeRig, turn: bool, kind: tuple[str, ...], action: tuple[str, ...]
 ) -> None:
-    rig, _ = line
     rig.turn = turn
     assert manual.main([f"--serial={rig.path}", *kind, *action], sys.stdout) == 1
     assert not {"GOTO", "CALIBRATE", "RUN"} & {word for word, _ in rig.received}
@@ -63,8 +61,7 @@ def test_a_heading_may_have_the_name_of_another_turn() -> None:
     assert not start.near(Position(0, 0, -3.1), Position(0, 0, 3.1))
 
 
-def test_by_hand_any_heading_is_reached(line: tuple[FakeRig, Link], capsys: pytest.CaptureFixture[str]) -> None:
-    rig, _ = line
+def test_by_hand_any_heading_is_reached(rig: FakeRig, capsys: pytest.CaptureFixture[str]) -> None:
     assert manual.main([f"--serial={rig.path}", "--kind=circle", "goto", "0", "0", "350"], sys.stdout) == 0
     assert rig.commands("GOTO")[-1] == pytest.approx((0, 0, math.radians(-10)), abs=1e-4)
     assert manual.main([f"--serial={rig.path}", "--kind=circle", "goto", "2", "0", "0"], sys.stdout) == 2

@@ -132,7 +132,9 @@ def test_a_memory_that_takes_nothing_is_an_error(line: tuple[FakeRig, Link]) -> 
 
 @pytest.mark.thorough
 def test_the_service_writes_them_when_it_calibrates(line: tuple[FakeRig, Link]) -> None:
-    rig, _ = line
+    rig, link = line
+    link.close()
+    rig.received.clear()
     assert "calibrate it" in refusal("gantry", f"--serial={rig.path}", f"--limits={TEXT}")
     assert not MOVES & set(words(rig))
     with built("gantry", f"--serial={rig.path}", f"--limits={TEXT}", "--calibrate") as model:

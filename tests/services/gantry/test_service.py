@@ -165,7 +165,7 @@ def test_an_outage_of_the_line_ends_the_test(rig: FakeRig) -> None:
 def test_a_rig_that_never_answers(rig: FakeRig, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(link, "PATIENCE", 0.5)
     rig.silent = True
-    assert refused(rig) == f"the rig at {rig.path} gave no answer for 0.5 s: it does not answer"
+    assert refused(rig) == f"the rig at {rig.path} gave no answer for 0.5 s"
 
 
 def test_who_moves_the_vehicle_and_who_runs_the_test_may_not_fall_silent(rig: FakeRig) -> None:
