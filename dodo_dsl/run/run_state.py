@@ -1,6 +1,5 @@
 """The state of one test while it runs: how far it is, and what decides it."""
 
-import signal
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -12,7 +11,6 @@ from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import start_order
 from dodo_dsl.run.machine_load import judgement
 from dodo_dsl.run.machine_load.judgement import consider
-from dodo_dsl.run.machine_load.processes import memory_kills
 from dodo_dsl.run.outcomes import (
     Cause,
     Facts,
@@ -53,9 +51,6 @@ from dodo_dsl.run.sides import Backend
 MOST_NOTES = 100
 _MOST_OF_GRAPH = 3
 """What is said of a ROS graph in the reason of an outcome."""
-MEMORY_KILL = "the kernel ended a program of this machine for want of memory during the test"
-"""A note where a service was killed: which program it was, and by whose limit, the kernel's count does not say."""
-_KILLED = -signal.SIGKILL, 128 + signal.SIGKILL
 
 
 class Ended(Exception):
@@ -91,10 +86,8 @@ class RunState:
     resources: tuple[ServiceUse, ...] = ()
     _tails: dict[str, tuple[str, ...]] = field(default_factory=dict)
     _unmatched: Sequence[str] = ()
-    _killed_before: int = field(init=False)
 
     def __post_init__(self) -> None:
-        self._killed_before = memory_kills()
         self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
 
     def test_s(self) -> float:
@@ -196,8 +189,6 @@ class RunState:
             is_done = (code == 0 and self.input_ended) or start_order.may_end(
                 self.plan.application.services, service, code
             )
-            if code in _KILLED and not out_of_memory and memory_kills() > self._killed_before:
-                self.notes.append(MEMORY_KILL)
             if not is_done and not self._all_verdicts_given():
                 reason = f"application service '{service}' {ended}, before the test was decided"
                 waits = start_order.waits(self.plan.application.services, service) if self.began is None else ""

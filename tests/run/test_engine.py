@@ -9,7 +9,7 @@ import pytest
 
 from dodo_dsl.outcome import MachineLoad, Outcome
 from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Flag, Lockstep, Plan
-from dodo_dsl.run import listeners, run_state
+from dodo_dsl.run import listeners
 from dodo_dsl.run.engine import (
     LAST_TIME_PATIENCE_S,
     LISTEN_PATIENCE_S,
@@ -40,7 +40,7 @@ from dodo_dsl.run.protocol import (
     Unstartable,
     VerdictEvent,
 )
-from dodo_dsl.run.run_state import MEMORY_KILL, Standing
+from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.start_order import LONGEST_S
 from dodo_dsl.spec.model import ResourceLimits
 from tests.run.scripted import BUSY, FAILED, PASSED, READY, Events, ScriptedBackend, drives, load, plan, run
@@ -514,17 +514,6 @@ def test_what_is_written_after_the_decision_is_not_quoted() -> None:
 
     stages = {**READY, "begin": [(1.0, FAILED), (1.0, ENDED)]}
     assert outcome(Talking(plan(), stages, tails={"track": ["it hit the wall"]})).last_lines == ("it hit the wall",)
-
-
-@pytest.mark.parametrize(("kills", "notes"), [([3, 3], ()), ([3, 4], (MEMORY_KILL,))])
-def test_a_kill_for_want_of_memory_is_noted_and_no_excuse(
-    monkeypatch: pytest.MonkeyPatch, kills: list[int], notes: tuple[str, ...]
-) -> None:
-    """It may be that of another test by its own limit."""
-    monkeypatch.setattr(run_state, "memory_kills", lambda: kills.pop(0))
-    found = begun((1.0, Exited("app", -9)))
-    assert (found.outcome, found.notes) == ("failed", notes)
-    assert found.reason.startswith("application service 'app' was killed by SIGKILL")
 
 
 @pytest.mark.parametrize(

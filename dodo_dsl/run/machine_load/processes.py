@@ -53,14 +53,6 @@ def table(proc: Path = PROC, counted: Collection[int] = ()) -> dict[int, Process
     return found
 
 
-def memory_kills(proc: Path = PROC) -> int:
-    """How many processes the kernel has ended for want of memory since the machine started."""
-    with contextlib.suppress(OSError):
-        words = (proc / "vmstat").read_text().split()
-        return int(words[words.index("oom_kill") + 1]) if "oom_kill" in words else 0
-    return 0
-
-
 def _process(pid: int, proc: Path) -> Process | None:
     try:
         words = (proc / str(pid) / "stat").read_bytes().rpartition(b")")[2].split()
