@@ -14,6 +14,7 @@ from dodo_dsl.run.outcomes import deaf
 from dodo_dsl.run.protocol import (
     BackendError,
     Event,
+    Exited,
     Foreign,
     GraphFinding,
     Late,
@@ -126,13 +127,15 @@ class Engine:
         return await self.backend.close(keep)
 
     async def _collect_losses(self) -> None:
-        """Losses, lateness, notes and the clock's time as reported in teardown; other events do not count then.
+        """Losses, lateness, notes, ends and the clock's time as reported in teardown; other events do not count then.
 
         But for what the application must not send: only when all is read is it known that nothing was.
         """
         while (event := await self._next(0.0)) is not None:
             if isinstance(event, Foreign):
                 self.state.add_finding("failed", event.reason)
+            if isinstance(event, Exited):
+                self.state.note_end(event, is_asked=True)
             if isinstance(event, Overrun | Late | Paused | Noted | Time | GraphFinding):
                 self.state.take(event)
 

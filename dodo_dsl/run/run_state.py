@@ -1,5 +1,6 @@
 """The state of one test while it runs: how far it is, and what decides it."""
 
+import signal
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -51,6 +52,11 @@ from dodo_dsl.run.sides import Backend
 MOST_NOTES = 100
 _MOST_OF_GRAPH = 3
 """What is said of a ROS graph in the reason of an outcome."""
+_KILLED, _ASKED = ((-number, 128 + number) for number in (signal.SIGKILL, signal.SIGTERM))
+
+
+def _how(event: Exited) -> str:
+    return "ran out of memory" if event.out_of_memory else how_it_ended(event.code)
 
 
 class Ended(Exception):
@@ -179,10 +185,21 @@ class RunState:
             self._end_with(Finding("failed", event.reason, self._first_application(), "silence", event.silent))
         self.end("error", event.reason, CLOCK)
 
+    def note_end(self, event: Exited, is_asked: bool) -> None:
+        """Notes an end of the application's that decides nothing, unless it is a good one or by SIGTERM."""
+        if self.layer_of.get(event.service) != "application" or event.code in (0, *_ASKED):
+            return
+        if is_asked and BRIDGE in self.layer_of and event.code == 1:
+            return  # so ends a node of rclpy that does not catch the exception of its executor
+        how = "did not end upon SIGTERM and was killed" if is_asked and event.code in _KILLED else _how(event)
+        when = "as the test ended" if is_asked else "when all was judged"
+        at = self._when() or (f"after {self.time.seconds:.1f} s of test time" if self.time else "")
+        self._remember(Noted(f"application service '{event.service}' {how} {when}, {at}".rstrip(", ")))
+
     def _take_exit(self, event: Exited) -> None:
         service, code, out_of_memory = event.service, event.code, event.out_of_memory
         layer, when = self.layer_of.get(service, "application"), self._when()
-        ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}".rstrip()
+        ended = f"{_how(event)} {when}".rstrip()
         if service == BRIDGE:
             self.end("error", f"the bridge to the application's ROS graph {ended}", service)
         if layer == "application":
@@ -193,6 +210,8 @@ class RunState:
                 reason = f"application service '{service}' {ended}, before the test was decided"
                 waits = start_order.waits(self.plan.application.services, service) if self.began is None else ""
                 self.end("failed", f"{reason}; {waits}" if waits else reason, service, "end")
+            if not is_done:
+                self.note_end(event, is_asked=False)
         elif code != 0:
             self.end("error", f"service '{service}' of layer {layer} {ended}", service, "end")
         elif service not in self.ready and self.began is None:

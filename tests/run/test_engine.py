@@ -1,6 +1,7 @@
 """One test from set-up to outcome, on a backend that reports given events."""
 
 import asyncio
+import signal
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -364,6 +365,27 @@ def test_a_verdict_says_what_the_application_is_told() -> None:
     for stages, expected in ((drives(), f"it drove; {told}"), ({**READY, "begin": [(1.0, Lost("gone"))]}, "gone")):
         found = outcome(ScriptedBackend(replace(plan(), told=("opendlv.sim.Frame",)), stages))
         assert found.reason == expected
+
+
+@pytest.mark.parametrize(
+    ("code", "how"),
+    [
+        (-signal.SIGSEGV, "was killed by SIGSEGV"),
+        (128 + signal.SIGABRT, "was killed by SIGABRT"),
+        (3, "ended with exit code 3"),
+        (-signal.SIGKILL, "did not end upon SIGTERM and was killed"),
+        *((code, "") for code in (0, -signal.SIGTERM, 128 + signal.SIGTERM)),
+    ],
+)
+def test_how_the_application_ends_is_noted_and_no_verdict(code: int, how: str) -> None:
+    closed = {"begin": [(0.5, Time(4.0, last=True)), *drives()["begin"]], "close": [(0.0, Exited("app", code))]}
+    for lockstep, after in ((0.0, "5.0 s"), (60.0, "4.0 s of test time")):
+        found = outcome(ScriptedBackend(plan(lockstep=lockstep), {**drives(), **closed}))
+        told = (f"application service 'app' {how} as the test ended, after {after}",) if how else ()
+        assert (found.outcome, found.notes) == ("passed", told)
+    early = begun((4.0, PASSED), (4.5, Exited("app", code)), (5.0, ENDED)).notes
+    told = (f"application service 'app' {how} when all was judged, after 4.5 s",) if how else ()
+    assert code == -signal.SIGKILL or early == told
 
 
 def test_losses_and_notes_count_until_teardown_has_ended_and_nothing_else_does() -> None:
