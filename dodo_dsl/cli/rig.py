@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, TextIO
 
-from dodo_dsl.cli import rig_truth, selection
+from dodo_dsl.cli import rig_measure, rig_truth, selection
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.cli.numbers import finite, patience
 from dodo_dsl.run.rigs import access, leases
@@ -22,10 +22,12 @@ EXAMPLES = """examples:
   dodo rig home kiwi-dynamic            move to its switches
   dodo rig clear kiwi-dynamic           end its quarantine after a repair
   dodo rig goto emulated 0 0 0          on any machine with the firmware emulator
+  dodo rig measure kiwi-dynamic         the constants of its axes, by a ruler and a protractor
   dodo rig truth kiwi-static -o truths/desk.json --box yellow 199 329 36 55
                                         a snapshot and its truth, for object-detection
 
-exit codes: 0 done, 1 a rig is in quarantine, 2 wrong usage or a position outside the limits, 3 the rig failed
+exit codes: 0 done, 1 a rig is in quarantine or readings do not fit, 2 wrong usage or a position outside the limits,
+3 the rig failed
 """
 ACTIONS = {
     "status": "show whether a rig is in quarantine, and its position",
@@ -49,11 +51,13 @@ def add(parser: argparse.ArgumentParser) -> None:
         wait = "maximum wait for a busy rig, in s (default: 60)"
         action.add_argument("--wait", type=patience, default=60.0, metavar="S", help=wait)
         action.add_argument("--json", action="store_true", help="output as JSON")
-    raw, summary = argparse.RawDescriptionHelpFormatter, rig_truth.SUMMARY
-    truth = actions.add_parser(
-        "truth", help=summary, description=summary, epilog=rig_truth.EXAMPLES, formatter_class=raw
-    )
-    rig_truth.add(truth)
+    for name, module in {"measure": rig_measure, "truth": rig_truth}.items():
+        formatter = argparse.RawDescriptionHelpFormatter
+        module.add(
+            actions.add_parser(
+                name, help=module.SUMMARY, description=module.SUMMARY, epilog=module.EXAMPLES, formatter_class=formatter
+            )
+        )
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
@@ -65,6 +69,8 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.action == "truth":
         stdout.write(rig_truth.make(options, deployment, chosen[0], say) + "\n")
         return Exit.OK
+    if options.action == "measure":
+        return rig_measure.measure(options, chosen[0], stdout, stderr)
     results = [_one(options, rig, say) for rig in chosen]
     if options.json:
         stdout.write(json_text(results))
@@ -112,7 +118,9 @@ def _one(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> d
 def _moved(options: argparse.Namespace, rig: Rig, say: Callable[[str], None]) -> dict[str, Any]:
     place = (options.x, options.y, options.yaw) if options.action == "goto" else ()
     words = [*access.flags(rig), options.action, *(f"{number:g}" for number in place)]
-    return access.ask((MANUAL, words), rig.cid, f"'dodo rig {options.action}'", say, options.wait)
+    user = f"'dodo rig {options.action}'"
+    with access.occupied(rig.cid, user, leases.devices_in(words), say, options.wait) as query:
+        return query((MANUAL, words))
 
 
 def _limits_sentence(limits: Mapping[str, Any]) -> list[str]:

@@ -13,6 +13,7 @@ from dodo_dsl.cli.numbers import patience
 from dodo_dsl.rec import truth
 from dodo_dsl.rec.truth import Mark, TruthError, TruthFiles, decoded, given
 from dodo_dsl.run.rigs import access
+from dodo_dsl.run.rigs.leases import devices_in
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import of_test
 from dodo_dsl.spec.manifest import Manifest, load_manifests
@@ -103,7 +104,8 @@ def _looked(
         path = Path(folder) / "snapshot.png"
         words = [*snapshot.words, f"--output={path}"]
         words += [f"--truth-classes={options.classes}"] if snapshot.is_rendered and "=" in options.classes else []
-        answer = access.ask((snapshot.program, words), rig.cid, "'dodo rig truth'", say, options.wait)
+        with access.occupied(rig.cid, "'dodo rig truth'", devices_in(words), say, options.wait) as query:
+            answer = query((snapshot.program, words))
         if answer.get("reason"):
             say(f"warning: {answer['reason']}")
         return path.read_bytes(), answer

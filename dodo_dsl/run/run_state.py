@@ -197,7 +197,7 @@ class RunState:
         self._remember(Noted(f"application service '{event.service}' {how} {when}, {at}".rstrip(", ")))
 
     def _take_exit(self, event: Exited) -> None:
-        service, code, out_of_memory = event.service, event.code, event.out_of_memory
+        service, code = event.service, event.code
         layer, when = self.layer_of.get(service, "application"), self._when()
         ended = f"{_how(event)} {when}".rstrip()
         if service == BRIDGE:

@@ -91,7 +91,7 @@ def main(argv: Sequence[str], stdout: TextIO) -> int:
         flags, action, numbers = _parsed(argv)
         limits, kept = _limits(flags), kept_limits(flags)
         goal = _goal(action, numbers, limits, conversion_of(flags))
-        result, code = _done(flags, action, goal, kept)
+        result, code = _done(flags, action, goal, limits, kept)
     except RigError as error:
         result, code = {"error": str(error)}, BROKEN
     except ManualUsageError as error:
@@ -143,7 +143,9 @@ def _goal(action: str, numbers: Sequence[float], limits: MotionLimits, conversio
     return goal
 
 
-def _done(flags: Flags, action: str, goal: Position | None, kept: Mapping[str, float]) -> tuple[dict[str, Any], int]:
+def _done(
+    flags: Flags, action: str, goal: Position | None, limits: MotionLimits, kept: Mapping[str, float]
+) -> tuple[dict[str, Any], int]:
     patience = flags["patience"]
     with ExitStack() as resources, interruptible():
         stop_without_master()
@@ -153,7 +155,7 @@ def _done(flags: Flags, action: str, goal: Position | None, kept: Mapping[str, f
                 run_checks(link, kept, patience)
             except RigError as error:
                 return {"ok": False, "reason": str(error)}, BROKEN
-            return {"ok": True, **_where(link)}, DONE
+            return {"ok": True, **_where(link, limits)}, DONE
         status = start.find(link)
         calibrates = action == "calibrate" or bool(emulated and goal)
         if action != "status":
@@ -165,11 +167,14 @@ def _done(flags: Flags, action: str, goal: Position | None, kept: Mapping[str, f
         if goal:
             start.settle(link, status)
             start.go(link, goal, patience)
-        return _where(link), DONE
+        return _where(link, limits), DONE
 
 
-def _where(link: Link) -> dict[str, Any]:
-    """Status and true limits (yaw in rad); after homing the place (yaw in degrees) and the counters' full steps."""
+def _where(link: Link, limits: MotionLimits) -> dict[str, Any]:
+    """Status, true limits and places within reach; after homing the true place, and the counters' full steps.
+
+    Yaw is in degrees but in ``limits``, which are those that the rig's memory has.
+    """
     at, status = read_state(link)
     return {
         "status": int(status),
@@ -179,6 +184,11 @@ def _where(link: Link) -> dict[str, Any]:
         "y": at.y if at else None,
         "yaw": math.degrees(at.yaw) if at else None,
         "limits": memory.shown(memory.read_memory(link), link.conversion),
+        "reach": {
+            "x": [limits.low.x, limits.high.x],
+            "y": [limits.low.y, limits.high.y],
+            "yaw": None if link.conversion.circle else [math.degrees(end.yaw) for end in (limits.low, limits.high)],
+        },
         "steps": {axis: round(count, 4) for axis, count in link.conversion.steps(at).items()} if at else None,
     }
 

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import json
 import signal
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from dodo_dsl.plan.added_services import CAMERA, DRAWN, hardware
 from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.run.process.environment import base_environment
 from dodo_dsl.run.process.slot import package_path
-from dodo_dsl.run.rigs.leases import devices_in, leased
+from dodo_dsl.run.rigs.leases import leased
 from dodo_dsl.run.rigs.problems import ProgramTimeout, RigProblem
 from dodo_dsl.spec.arguments import Argument, ValueProblem, convert, default_value, resolved
 from dodo_dsl.spec.manifest import Manifest, Parameter, load_manifests
@@ -80,21 +80,44 @@ async def _end(process: asyncio.subprocess.Process) -> None:
         await process.wait()
 
 
-def ask(command: Command, cid: int | None, user: str, say: Callable[[str], None], patience_s: float) -> dict[str, Any]:
-    """The answer of a rig's program, while nobody else uses the rig; raises LeaseTimeout and RigProblem."""
-
-    async def asked() -> dict[str, Any]:
-        task = asyncio.current_task()
-        assert task is not None
-        for number in (signal.SIGTERM, signal.SIGHUP):
-            asyncio.get_running_loop().add_signal_handler(number, task.cancel)
-        async with leased(cid, user, say, patience_s, devices_in(command[1])) as descriptors:
-            return await query(*command, descriptors=descriptors)
-
+@contextlib.contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """Within the block, a signal that ends this process cancels its task."""
+    loop, task = asyncio.get_running_loop(), asyncio.current_task()
+    assert task is not None
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        loop.add_signal_handler(number, task.cancel)
     try:
-        return asyncio.run(asked())
-    except asyncio.CancelledError:
-        raise KeyboardInterrupt from None
+        yield
+    finally:
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            loop.remove_signal_handler(number)
+
+
+@contextlib.contextmanager
+def occupied(
+    cid: int | None, user: str, devices: Sequence[str], say: Callable[[str], None], patience_s: float
+) -> Iterator[Callable[[Command], dict[str, Any]]]:
+    """For queries with a program and its words, while and between which nobody else uses the rig; a signal ends each.
+
+    ``user`` names the holder of the leases to others. Raises LeaseTimeout, and the queries RigProblem.
+    """
+    with asyncio.Runner() as runner, contextlib.ExitStack() as held:
+        leasing = leased(cid, user, say, patience_s, devices)
+        descriptors = runner.run(leasing.__aenter__())
+        held.callback(lambda: runner.run(leasing.__aexit__(None, None, None)))
+
+        async def asked(command: Command) -> dict[str, Any]:
+            with _ended_by_signals():
+                return await query(*command, descriptors=descriptors)
+
+        def ask(command: Command) -> dict[str, Any]:
+            try:
+                return runner.run(asked(command))
+            except asyncio.CancelledError:
+                raise KeyboardInterrupt from None
+
+        yield ask
 
 
 PROGRAMS = {

@@ -2,13 +2,14 @@
 
 import asyncio
 import os
+import signal
 import sys
 from pathlib import Path
 
 import pytest
 
 from dodo_dsl.run.rigs import access
-from dodo_dsl.run.rigs.access import query
+from dodo_dsl.run.rigs.access import occupied, query
 from dodo_dsl.run.rigs.problems import ProgramTimeout, RigProblem
 
 PYTHON = (sys.executable, "-c")
@@ -69,3 +70,11 @@ time.sleep(600)
 
     asyncio.run(scene())
     assert (tmp_path / "stopped").exists()
+
+
+def test_signals_end_the_command_between_two_queries(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As while a person reads a ruler."""
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path))
+    with occupied(121, "'dodo rig measure'", [], print, 1.0) as ask:
+        assert ask((PYTHON, ["print({})"])) == ask((PYTHON, ["print({})"])) == {}
+        assert signal.getsignal(signal.SIGTERM) == signal.getsignal(signal.SIGHUP) == signal.SIG_DFL
