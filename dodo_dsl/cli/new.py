@@ -80,7 +80,6 @@ EXAMPLES = """examples:
   dodo new hil-my-curve --level hil                    the same on a rig, or emulated by dodo run --emulate
   dodo new sil-my-dark --extends sil-my-curve          a changed copy of another test
   dodo new dil-mine --level dil --rec drive.rec        your own recording, and its signal as the target
-  dodo new dil-bag --level dil --rec bag               the same of a bag of ROS 2
   dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a shipped test and its files
   dodo new --map chicane --line 'straight 1 m, left 45 deg radius 1 m, right 45 deg radius 1 m, straight 1 m'
   dodo new --map hall --line points.csv --width '80 cm'  a map along points, x and y in m
@@ -112,7 +111,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     of_test.add_argument("--kind", choices=KINDS, help="default: closed-loop")
     of_test.add_argument("--extends", metavar="TEST", help="test that the new one extends; a shipped one is copied")
     of_test.add_argument("--rec", metavar="FILE.rec", type=Path,
-                         help="recording, or bag of ROS 2, that a new dil test plays, with its target")  # fmt: skip
+                         help="recording that a new dil test plays, with its target")  # fmt: skip
     of_map = parser.add_argument_group("of a map")
     of_map.add_argument(
         "--line", metavar="LINE", help="its centre line, as below, or a CSV file of points, x and y in m"
@@ -353,12 +352,8 @@ def _files(
 
         declared = [*application.declared.values()] if application else []
         sent = {name.partition("/")[0] for each in declared if each for name, _ in each.outputs}
-        with recorded_drive.recording_of(options.rec) as (rec, imported):
-            drive = recorded_drive.look(rec, sent)
-            of_ros = any(each.topics for each in declared if each)
-            made, note = recorded_drive.files(options.name, rec, drive, registry, root, pictures, of_ros)
-        note = imported + note + (pictures.note if drive.cameras else "")
-        return made, note + recorded_drive.unpassable(rec, drive, application, pictures)
+        of_ros = any(each.topics for each in declared if each)
+        return recorded_drive.files(options.name, options.rec, sent, registry, root, pictures, of_ros)
     level, kind = options.level or LEVEL, options.kind or KIND
     if base := options.extends or STARTS[level, kind]:
         return _from_another(options.name, base, checked, shipped, registry, root)

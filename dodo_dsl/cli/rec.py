@@ -24,19 +24,15 @@ _EXPORT = """examples:
   dodo rec export drive.rec --frames -o pictures --pictures jpg
   dodo rec export drive.rec --video -o drive.mp4 --camera 0
   dodo rec export drive.rec --mcap -o drive.mcap
-  dodo rec export drive.rec --ros -o bag --storage sqlite3
+  dodo rec export drive.rec --ros -o bag
   dodo rec export old.rec --csv -o tables --messages 0.9 --messages own.odvd
   dodo rec export drive.rec --coco -o labelled --labels 3 --pictures jpg
-  dodo rec export desk.rec --coco -o labelled --truth desk.json
-  dodo rec export drive.rec old.rec --coco -o set --labels 3 --validation 50%
-  dodo rec export drive.rec old.rec --steering -o pairs --validation 50%
 """
 _FORMATS = {
     "csv": "write one table per message and sender stamp",
     "coco": "write frames with the boxes of the detections",
-    "steering": "write frames with the steering and the pedal that answered them, for programs that learn to drive",
     "frames": "write the camera's frames as images, named by sender stamp and sample time",
-    "video": "write the camera's packets into an MP4, h264 as recorded and other formats encoded again",
+    "video": "write the camera's frames into an MP4 of h264",
     "mcap": "write an MCAP file for Foxglove, Lichtblick or rerun (needs DoDo's extra 'mcap')",
     "ros": "write a bag of ROS 2, a topic for each message that has a type there (needs DoDo's extra 'ros')",
 }
@@ -67,18 +63,6 @@ def add(parser: argparse.ArgumentParser) -> None:
     export.add_argument(
         "--labels", metavar="N", type=_stamp, help="sender stamp of the detections for --coco (default: all)"
     )
-    export.add_argument(
-        "--truth", metavar="FILE.json", type=Path, help="truth file with the boxes for --coco, the same for every frame"
-    )
-    export.add_argument(
-        "--validation", metavar="SHARE", type=_share, default=0.0,
-        help="with --coco or --steering: folders train and validation, the latter with this share of the recordings",
-    )  # fmt: skip
-    export.add_argument("--seed", metavar="N", type=_stamp, default=0, help="chooses those recordings (default: 0)")
-    export.add_argument(
-        "--storage", choices=("mcap", "sqlite3"), default="mcap", help="storage of the bag for --ros (default: mcap)"
-    )
-    export.add_argument("--all", action="store_true", help="with --coco: also export frames without a detection")
     for action in (cut, export):
         _selection(action)
     text = "make a recording of a bag of ROS 2, by the types of its topics (needs DoDo's extra 'ros')"
@@ -98,15 +82,10 @@ def _action(
     action = actions.add_parser(
         name, help=text, description=text, epilog=examples, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    if name == "export":
-        action.add_argument(
-            "files", metavar="FILE.rec", type=Path, nargs="+", help="--coco and --steering take several"
-        )
-    elif name == "import":
+    if name == "import":
         action.add_argument("file", metavar="BAG", type=Path, help="folder of rosbag2, or its .mcap or .db3")
         return action
-    else:
-        action.add_argument("file", metavar="FILE.rec", type=Path)
+    action.add_argument("file", metavar="FILE.rec", type=Path)
     action.add_argument(
         "--messages",
         metavar="SET",
@@ -136,16 +115,6 @@ def _stamp(text: str) -> int:
     if not is_whole(text):
         raise argparse.ArgumentTypeError(f"'{text}' is not a sender stamp, expected a whole number")
     return whole(text)
-
-
-def _share(text: str) -> float:
-    try:
-        value = number(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a share, expected more than 0% and less than 100%")
-    return value
 
 
 def _seconds(text: str) -> float:

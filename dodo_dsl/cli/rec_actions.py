@@ -119,14 +119,12 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
 
         rec_bag.import_bag(options, stdout, stderr)
         return
-    if options.action == "export":
-        from dodo_dsl.cli import rec_export
-
-        if rec_export.is_data_set(options):
-            rec_export.run(options, stdout, stderr)
-            return
-        options.file = _only_one(options)
-    with opened(options.file, options, stdout, stderr) as (job, version):
+    path: Path = options.file
+    with progress_bar(stderr, f"reading {path.name}", path.stat().st_size) as progress:
+        recording = Recording(path, progress)
+    with recording:
+        version, messages = messages_for(recording, options.messages, lambda text: tell(stderr, text))
+        job = RecJob(options, recording, messages, stdout, stderr)
         if options.action == "info":
             _info(job, version)
         elif options.action == "cut":
@@ -135,24 +133,6 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
             from dodo_dsl.cli import rec_export
 
             rec_export.EXPORTS[options.format](job)
-
-
-@contextmanager
-def opened(path: Path, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> Iterator[tuple[RecJob, str]]:
-    """A recording with its messages, and the version of their set."""
-    with progress_bar(stderr, f"reading {path.name}", path.stat().st_size) as progress:
-        recording = Recording(path, progress)
-    with recording:
-        version, messages = messages_for(recording, options.messages, lambda text: tell(stderr, text))
-        yield RecJob(options, recording, messages, stdout, stderr), version
-
-
-def _only_one(options: argparse.Namespace) -> Path:
-    """The recording, for what takes one; raises NothingSelected for several."""
-    files: list[Path] = options.files
-    if len(files) > 1:
-        raise NothingSelected(f"--{options.format} takes one recording; only --coco and --steering join several")
-    return files[0]
 
 
 def _info(job: RecJob, version: str) -> None:

@@ -1,4 +1,4 @@
-"""Bags of ROS 2 in ``dodo rec`` and ``dodo new``: what becomes of each topic, and what is left out."""
+"""Bags of ROS 2 in ``dodo rec``: what becomes of each topic, and what is left out."""
 
 import argparse
 from collections.abc import Callable, Iterable
@@ -25,42 +25,33 @@ if TYPE_CHECKING:
     from dodo_dsl.rec.bag_export import BagExport
     from dodo_dsl.rec.bag_import import BagImport
 
-_ENDINGS = {"mcap": ".mcap", "sqlite3": ".db3"}
-
-
-def is_bag(path: Path) -> bool:
-    """Whether a path is that of a bag, and not of a recording."""
-    return path.is_dir() or path.suffix in _ENDINGS.values()
-
 
 def import_bag(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
-    """Makes a recording of a bag."""
-    path: Path = options.file
-    output: Path = options.output or path.resolve().with_suffix(".rec")
-    refuse_existing([output], options.force)
-    with atomic.replacing(output, durable=True) as place:
-        said = into(path, place, options.lossy, lambda text: tell(stderr, text), stderr)
-    stdout.write(f"{output}: {said}")
-
-
-def into(path: Path, place: Path, lossy: bool, problem: Callable[[str], None], stderr: TextIO) -> str:
-    """Write the recording of a bag, and return what each of its topics became.
+    """Makes a recording of a bag, and says what each of its topics became.
 
     Topics of the application around here have its messages, others the usual ones of their types.
     """
     _require_rosbags("a bag of ROS 2")
     from dodo_dsl.rec.bag_import import BagImport
 
+    path: Path = options.file
+    output: Path = options.output or path.resolve().with_suffix(".rec")
+    refuse_existing([output], options.force)
     known, types = _of_application()
-    with bag.opened(path) as found, progress_bar(stderr, f"reading {path.name}", found.counts.total()) as progress:
-        result = BagImport(found, types, known, lossy)
+    with (
+        atomic.replacing(output, durable=True) as place,
+        bag.opened(path) as found,
+        progress_bar(stderr, f"reading {path.name}", found.counts.total()) as progress,
+    ):
+        result = BagImport(found, types, known, options.lossy)
         result.write(place, progress)
     lines = [
         f"{each.topic} ({each.type}): {result.counts[each.topic]} -> {', '.join(each.bus)}"
         for each in result.topics.values()
     ]
     lines += [f"{topic} ({type_}): {count} -> left out" for (topic, type_), count in result.left_out.items()]
-    return _told(f"{result.counts.total()} messages of {len(result.topics)} topics", lines, result, problem)
+    text = f"{output}: {result.counts.total()} messages of {len(result.topics)} topics"
+    stdout.write(_told(text, lines, result, lambda said: tell(stderr, said)))
 
 
 def export_bag(job: RecJob) -> None:
@@ -69,13 +60,13 @@ def export_bag(job: RecJob) -> None:
     from dodo_dsl.opendlv.ros_messages import Types
     from dodo_dsl.rec.bag_export import BagExport
 
-    folder, storage = job.folder(), job.options.storage
-    refuse_existing([folder / "metadata.yaml", folder / f"{folder.name}{_ENDINGS[storage]}"], job.options.force)
+    folder = job.folder()
+    refuse_existing([folder / "metadata.yaml", folder / f"{folder.name}.mcap"], job.options.force)
     rows = job.rows()
     with (
         atomic.files_into(folder) as place,
         job.progress(f"writing {folder.name}", len(rows)) as progress,
-        bag.written(place, folder.resolve().name, storage) as writer,
+        bag.written(place, folder.resolve().name) as writer,
     ):
         result = BagExport(job.recording, Types(messages=job.messages), writer)
         result.write(rows, progress)

@@ -23,8 +23,8 @@ EXAMPLES = """examples:
   dodo rig clear kiwi-dynamic           end its quarantine after a repair
   dodo rig goto emulated 0 0 0          on any machine with the firmware emulator
   dodo rig measure kiwi-dynamic         the constants of its axes, by a ruler and a protractor
-  dodo rig truth kiwi-static -o truths/desk.json --box yellow 199 329 36 55
-                                        a snapshot and its truth, for object-detection
+  dodo rig truth kiwi-static -o truths/desk.json
+                                        a snapshot, and of the emulated rig the truth for object-detection
 
 exit codes: 0 done, 1 a rig is in quarantine or readings do not fit, 2 wrong usage or a position outside the limits,
 3 the rig failed

@@ -87,12 +87,12 @@ def _readable(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def written(folder: Path, name: str, storage: str) -> Iterator[Any]:
+def written(folder: Path, name: str) -> Iterator[Any]:
     """The writer of a new bag; its files go to an empty folder, named after the bag."""
     from rosbags.rosbag2 import StoragePlugin, Writer
 
     inner = folder / name
-    with Writer(inner, version=9, storage_plugin=StoragePlugin[storage.upper()]) as writer:
+    with Writer(inner, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         yield writer
     for file in inner.iterdir():
         file.rename(folder / file.name)

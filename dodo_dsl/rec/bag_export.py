@@ -16,9 +16,9 @@ from dodo_dsl.opendlv.ros_codec import Fields, RosTypeError
 from dodo_dsl.opendlv.ros_messages import CameraPicture, Types
 from dodo_dsl.opendlv.ros_types import COMPRESSED, DETECTIONS, CameraView, Topic
 from dodo_dsl.opendlv.ros_types import IMAGE as IMAGE_TYPE
-from dodo_dsl.opendlv.video import CODECS, VideoDecoder, VideoError
+from dodo_dsl.opendlv.video import CODECS, VideoError
 from dodo_dsl.rec.bag import WRITTEN, Key
-from dodo_dsl.rec.frames import decoder_of, packet_of, packets
+from dodo_dsl.rec.frames import FrameDecoder, packet_of
 
 
 @dataclass
@@ -44,7 +44,7 @@ class BagExport:
         self.skipped, self.reasons = Counter[str](), dict[str, str]()
         self._recording, self._types, self._messages, self._writer = recording, types, types.messages, writer
         self._connections: dict[str, Any] = {}
-        self._decoders: dict[tuple[int, str], VideoDecoder] = {}
+        self._decoder = FrameDecoder()
 
     def write(self, rows: Numbers, progress: Callable[[int], None]) -> None:
         """Write the messages of some rows; ``progress`` gets how many are done."""
@@ -71,7 +71,10 @@ class BagExport:
 
     def _topics(self, there: list[tuple[int, int]], images: Numbers) -> Iterator[Topic]:
         """Those of which there are all messages, or of detections any; ``there`` are ids with their senders."""
-        sizes = [CameraView(width=each.width, height=each.height) for each in packets(self._recording, images)]
+        sizes = [
+            CameraView(width=each.width, height=each.height)
+            for each in map(packet_of, self._recording.envelopes(images))
+        ]
         camera = next((each for each in sizes if each.width and each.height), None)
         known = set(self._messages.names())  # set 0.9 lacks some
         for name, (type_, messages) in WRITTEN.items():
@@ -119,7 +122,7 @@ class BagExport:
                 data = {"format": "jpeg", "data": np.frombuffer(packet.data, np.uint8)}
                 fields = self._types.given_header(topic, time) | data
             else:
-                if (frame := decoder_of(self._decoders, packet).decode(packet.data)) is None:
+                if (frame := self._decoder.decode(packet)) is None:
                     raise VideoError("a packet cannot be decoded")
                 fields = self._types.given(topic, {}, time, CameraPicture(frame.pixels("bgr"), "bgr"))
             self._write(topic, time, fields)

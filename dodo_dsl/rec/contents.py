@@ -52,13 +52,12 @@ class Contents:
     apart: int
     untimed: int
     message_set: str
-    streams: list[MessageStream]
+    messages: list[MessageStream]
     frames: Frames
 
     def as_json(self, recording: Recording) -> dict[str, Any]:
         """For programs; see docs/how-to/recordings.md."""
         facts = asdict(self)
-        facts["messages"] = facts.pop("streams")
         facts["skipped"] = [asdict(place) for place in recording.damage.places]
         facts["skipped_bytes"], facts["skipped_places"] = recording.damage.size, recording.damage.count
         return {"file": str(recording.path), **facts}
@@ -88,7 +87,7 @@ def look(
         apart=len(stamped) - len(known),
         untimed=int((recording.index["sampled"] == 0).sum()),
         message_set=message_set,
-        streams=found,
+        messages=found,
         frames=_frames(recording, progress, problem),
     )
 
@@ -145,7 +144,7 @@ def contents_text(found: Contents, recording: Recording) -> str:
     lines += [f"skipped {place}" for place in recording.damage.places[:_SHOWN]]
     if recording.damage.count > _SHOWN:
         lines.append(f"skipped {recording.damage.size} bytes at {recording.damage.count} positions in all")
-    return "\n".join([*lines, "", *_table([_HEAD, *map(_row, found.streams)])]) + "\n"
+    return "\n".join([*lines, "", *_table([_HEAD, *map(_row, found.messages)])]) + "\n"
 
 
 def _row(stream: MessageStream) -> tuple[str, ...]:
@@ -155,9 +154,6 @@ def _row(stream: MessageStream) -> tuple[str, ...]:
 
 
 def _table(rows: list[tuple[str, ...]]) -> list[str]:
-    widths = [max(len(row[column]) for row in rows) for column in range(len(_HEAD))]
-    return ["  ".join(_cell(row, column, width) for column, width in enumerate(widths)).rstrip() for row in rows]
-
-
-def _cell(row: tuple[str, ...], column: int, width: int) -> str:
-    return row[column].ljust(width) if _HEAD[column] == "message" else row[column].rjust(width)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    aligned = [f"{{:{'<' if name == 'message' else '>'}{width}}}" for name, width in zip(_HEAD, widths, strict=True)]
+    return ["  ".join(aligned).format(*row).rstrip() for row in rows]

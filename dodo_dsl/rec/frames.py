@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,7 +37,8 @@ def images_of(recording: Recording, rows: Numbers, camera: int | None) -> Number
     """The image messages of one camera among some rows; raises FramesError for none, or for several."""
     index = recording.index[rows]
     images: Numbers = rows[index["data_type"] == IMAGE]
-    cameras = sorted(set(recording.index["sender_stamp"][images].tolist()))
+    senders = recording.index["sender_stamp"][images]
+    cameras = sorted(set(senders.tolist()))
     if not cameras:
         raise FramesError(f"the selection of {recording.path} holds no camera frames (opendlv.proxy.ImageReading)")
     stamps = ", ".join(map(str, cameras))
@@ -46,12 +46,7 @@ def images_of(recording: Recording, rows: Numbers, camera: int | None) -> Number
         raise FramesError(f"{recording.path} holds frames of the cameras {stamps}; choose one with --camera")
     if camera is not None and camera not in cameras:
         raise FramesError(f"{recording.path} holds no frames of camera {camera}, expected one of {stamps}")
-    return images if camera is None else images[recording.index["sender_stamp"][images] == camera]
-
-
-def packets(recording: Recording, rows: Numbers) -> Iterator[Packet]:
-    """The packets of image messages in the order of ``rows``; one that cannot be read has an empty format."""
-    return map(packet_of, recording.envelopes(rows))
+    return images if camera is None else images[senders == camera]
 
 
 def packet_of(envelope: Envelope) -> Packet:
@@ -64,29 +59,71 @@ def packet_of(envelope: Envelope) -> Packet:
     return Packet(stamp, time, image.format, image.data, image.width, image.height)
 
 
+class FrameDecoder:
+    """Decodes packets, those of each camera and format in their order.
+
+    At most 16 pairs of these are decoded, because each takes the memory of some frames.
+    """
+
+    def __init__(self) -> None:
+        self._decoders: dict[tuple[int, str], VideoDecoder] = {}
+
+    def decode(self, packet: Packet) -> DecodedFrame | None:
+        """The frame, None of a packet without one; raises VideoError for what is never decoded."""
+        if not packet.format:
+            return None
+        refuse_large(packet.width, packet.height)
+        key = packet.sender_stamp, packet.format
+        if key not in self._decoders:
+            if len(self._decoders) == MOST_DECODERS:
+                raise VideoError(f"frames of more than {MOST_DECODERS} cameras and formats are not decoded")
+            self._decoders[key] = VideoDecoder(packet.format)
+        return self._decoders[key].decode(packet.data)
+
+    def early(self) -> Iterator[str]:
+        """Sentences on packets before the first key frames."""
+        for (sender, _), decoder in self._decoders.items():
+            if early := decoder.early:
+                come = "packet of camera {} comes" if early == 1 else "packets of camera {} come"
+                yield f"{early} {come.format(sender)} before the first key frame, and so cannot be decoded"
+
+
 def decoded(
     recording: Recording, rows: Numbers, problem: Callable[[str], None]
 ) -> Iterator[tuple[Packet, DecodedFrame | None]]:
-    """Each packet with its frame, or None if it gave none; ``problem`` gets a sentence per reason for that.
-
-    At most 16 pairs of a camera and a format are decoded, because each takes the memory of some frames.
-    """
-    decoders: dict[tuple[int, str], VideoDecoder] = {}
-    reasons: set[str] = set()
-    for packet in packets(recording, rows):
+    """The packet of each image message with its frame; ``problem`` gets a sentence per reason for one without."""
+    decoder, reasons = FrameDecoder(), set[str]()
+    for packet in map(packet_of, recording.envelopes(rows)):
         frame = None
         try:
-            if packet.format:
-                frame = decoder_of(decoders, packet).decode(packet.data)
+            frame = decoder.decode(packet)
         except VideoError as error:
             if str(error) not in reasons and len(reasons) < MOST_DECODERS:
                 reasons.add(str(error))
                 problem(str(error))
         yield packet, frame
-    for (sender, _), decoder in decoders.items():
-        if early := decoder.early:
-            come = "packet of camera {} comes" if early == 1 else "packets of camera {} come"
-            problem(f"{early} {come.format(sender)} before the first key frame, and so cannot be decoded")
+    for text in decoder.early():
+        problem(text)
+
+
+def frames(
+    recording: Recording, images: Numbers, progress: Callable[[int], None], problem: Callable[[str], None]
+) -> Iterator[tuple[int, Packet, DecodedFrame]]:
+    """The frames that can be decoded, each with its number among ``images``; raises FramesError if there is none.
+
+    ``progress`` gets how many packets are done, ``problem`` sentences on those without a frame.
+    """
+    lost = 0
+    for number, (packet, frame) in enumerate(decoded(recording, images, problem)):
+        if frame is None:
+            lost += 1
+        else:
+            yield number, packet, frame
+        progress(number + 1)
+    if lost == len(images):
+        raise FramesError(f"no frame of {recording.path} can be decoded")
+    if lost:
+        problem(f"{lost} packet{'s' * (lost > 1)} cannot be decoded")
 
 
 def write_picture(path: Path, frame: DecodedFrame) -> None:
@@ -109,44 +146,3 @@ def frame_names(recording: Recording, images: Numbers, picture_type: str) -> lis
         number = f"-{taken[key]}" if taken[key] > 1 else ""
         found.append(f"{key[0]}-{key[1]}{number}.{picture_type}")
     return found
-
-
-@dataclass
-class PictureSet:
-    """Pictures ``inside`` a folder, as ``png`` or ``jpg``; ``problem`` gets what cannot be decoded at all."""
-
-    folder: Path
-    picture_type: str
-    problem: Callable[[str], None]
-    inside: str = "images/"
-    lost: int = 0
-
-    def frames(
-        self, recording: Recording, images: Numbers, name: str, progress: Callable[[int], None]
-    ) -> Iterator[tuple[Packet, DecodedFrame, str]]:
-        """The frames of a recording with the files for them; those in an earlier recording of the set have others."""
-        (self.folder / self.inside).mkdir(parents=True, exist_ok=True)
-        files = frame_names(recording, images, self.picture_type)
-        pairs = zip(files, decoded(recording, images, self.problem), strict=True)
-        for done, (file, (packet, frame)) in enumerate(pairs, 1):
-            if frame is None:
-                self.lost += 1
-            else:
-                yield packet, frame, f"{self.inside}{name}{file}"
-            progress(done)
-
-    def notes(self) -> Iterator[str]:
-        """Sentences on what is missing."""
-        if self.lost:
-            yield f"{self.lost} packet{'s' * (self.lost > 1)} cannot be decoded"
-
-
-def decoder_of(decoders: dict[tuple[int, str], VideoDecoder], packet: Packet) -> VideoDecoder:
-    """The decoder of a packet's camera, a new one for the first packet; raises VideoError."""
-    refuse_large(packet.width, packet.height)
-    key = packet.sender_stamp, packet.format
-    if key not in decoders:
-        if len(decoders) == MOST_DECODERS:
-            raise VideoError(f"frames of more than {MOST_DECODERS} cameras and formats are not decoded")
-        decoders[key] = VideoDecoder(packet.format)
-    return decoders[key]

@@ -1,8 +1,7 @@
 """A recording as an MCAP file, in protobuf: a topic for each message and sender stamp, and Foxglove's where they fit.
 
-Camera frames become CompressedVideo (H.264 and VP9) or CompressedImage (JPEG) with the same bytes, poses
-FrameTransform, scans LaserScan, odometry and estimates PoseInFrame, and log messages Log. Only messages with the
-fields of message set 1.0 or 0.9 do.
+Camera frames become CompressedVideo (H.264 and VP9) or CompressedImage (JPEG) with the same bytes, and poses
+FrameTransform, if they have the fields of message set 1.0 or 0.9.
 Reference: docs.foxglove.dev, "Message schemas"; mcap.dev, "MCAP File Format", and its registry on the encoding
 ``protobuf``.
 """
@@ -14,13 +13,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
-from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
-from foxglove_schemas_protobuf.Log_pb2 import Log
-from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
 from mcap.writer import Writer
@@ -41,8 +36,6 @@ Convert = Callable[[Any, int, int], tuple[str, Message] | None]
 WORLD = "world"
 _VIDEO = {"h264": "h264", "H264": "h264", "VP90": "vp9"}
 _IMAGE = {"mjpg": "jpeg", "MJPG": "jpeg"}
-_LEVELS = (Log.FATAL, Log.FATAL, Log.FATAL, Log.ERROR, Log.WARNING, Log.INFO, Log.INFO, Log.DEBUG)
-"""By the levels of syslog (RFC 5424, table 2)."""
 
 
 def converter(layout: Layout) -> Convert | None:
@@ -86,56 +79,14 @@ def _transform(message: Any, rotation: tuple[float, ...], stamp: int, time: int)
     return "/tf", found
 
 
-def _scan(message: Any, stamp: int, time: int) -> tuple[str, Message] | None:
-    """In the frame of the vehicle with the same sender stamp."""
-    if len(message.ranges) % 4:
-        return None
-    ranges = np.frombuffer(message.ranges, "<f4").tolist()
-    found = LaserScan(timestamp=_timestamp(time), frame_id=f"frame-{stamp}", ranges=ranges)
-    found.pose.orientation.w, found.start_angle = 1.0, message.angleMin
-    found.end_angle = message.angleMin + message.angleIncrement * max(len(ranges) - 1, 0)
-    return f"/scan/{stamp}", found
-
-
-def _odometry(message: Any, stamp: int, time: int) -> tuple[str, Message] | None:
-    if not math.isfinite(message.yaw):
-        return None
-    rotation = quaternion(0.0, 0.0, message.yaw)
-    return f"/odom/{stamp}", _posed("odom", (message.x, message.y, 0.0), rotation, time)
-
-
-def _estimate(message: Any, stamp: int, time: int) -> tuple[str, Message] | None:
-    rotation = message.qx, message.qy, message.qz, message.qw
-    return f"/estimate/{stamp}", _posed(WORLD, (message.x, message.y, message.z), rotation, time)
-
-
-def _posed(frame: str, place: tuple[float, ...], rotation: tuple[float, ...], time: int) -> Message:
-    found = PoseInFrame(timestamp=_timestamp(time), frame_id=frame)
-    found.pose.position.x, found.pose.position.y, found.pose.position.z = place
-    turn = found.pose.orientation
-    turn.x, turn.y, turn.z, turn.w = rotation
-    return found
-
-
-def _log(message: Any, stamp: int, time: int) -> tuple[str, Message] | None:
-    level = _LEVELS[message.level] if message.level < len(_LEVELS) else Log.UNKNOWN
-    return "/log", Log(timestamp=_timestamp(time), level=level, message=message.description, name=f"sender {stamp}")
-
-
 def _timestamp(time: int) -> Timestamp:
     seconds, microseconds = divmod(max(time, 0), 1_000_000)
     return Timestamp(seconds=seconds, nanos=microseconds * 1000)
 
 
-_ROBOTS = {"robot.PlanarScan": _scan, "robot.OdometryReading": _odometry, "robot.PoseEstimate": _estimate}
 _CONVERTERS: Mapping[str, Mapping[str, Convert]] = {
-    message_versions.NEW: {
-        "opendlv.proxy.ImageReading": _picture,
-        "opendlv.sim.Frame": _pose,
-        "opendlv.system.LogMessage": _log,
-        **_ROBOTS,
-    },
-    message_versions.OLD: {"opendlv.proxy.ImageReading": _picture, "opendlv.sim.Frame": _pose_of_angles, **_ROBOTS},
+    message_versions.NEW: {"opendlv.proxy.ImageReading": _picture, "opendlv.sim.Frame": _pose},
+    message_versions.OLD: {"opendlv.proxy.ImageReading": _picture, "opendlv.sim.Frame": _pose_of_angles},
 }
 
 
@@ -162,7 +113,7 @@ def write_mcap(
     the file's index. Raises OSError and RecordingError.
     """
     result = McapCounts()
-    ordered = rows[np.argsort(recording.index["time"][rows], kind="stable")]
+    ordered = rows[recording.index["time"][rows].argsort(kind="stable")]
     with place.open("wb") as stream:
         writer = Writer(stream)
         writer.start(library=f"DoDo {__version__}")

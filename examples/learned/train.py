@@ -1,12 +1,13 @@
 """Learn to steer from pairs of frames and steering: a linear function of what view.py sees (ridge regression).
 
-dodo rec export dodo-report/*/test.rec --steering -o pairs --validation 20%
-python train.py pairs model.npz
+python train.py drives model.npz, where each folder in drives has the frames and tables of dodo rec export
 """
 
 import argparse
 import csv
 import sys
+from bisect import bisect_left
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -20,16 +21,24 @@ STIFFNESS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 Numbers = NDArray[np.float64]
 
 
-def read(folder: Path) -> tuple[Numbers, Numbers]:
+PATIENCE = 200_000
+"""us after a frame in which steering answers it."""
+TABLE = "opendlv.proxy.GroundSteeringRequest-0.csv"
+
+
+def read(folders: Sequence[Path]) -> tuple[Numbers, Numbers]:
     """What is seen (frames x numbers), and the steering (frames)."""
     views, angles = [], []
-    with (folder / "steering.csv").open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            picture = cv2.imread(str(folder / row["picture"]))
-            if picture is None:
-                raise SystemExit(f"train: {folder / row['picture']} cannot be read")
-            views.append(view(picture))
-            angles.append(float(row["ground_steering_rad"]))
+    for folder in folders:
+        with (folder / TABLE).open(encoding="latin-1", newline="") as file:
+            rows = list(csv.DictReader(file, delimiter=";"))
+        times = [int(r["sampleTimeStamp.seconds"]) * 10**6 + int(r["sampleTimeStamp.microseconds"]) for r in rows]
+        for picture in sorted(folder.glob("*-*.png")):
+            time = int(picture.stem.split("-")[1])
+            at = bisect_left(times, time)
+            if at < len(times) and times[at] - time <= PATIENCE:
+                views.append(view(cv2.imread(str(picture))))
+                angles.append(float(rows[at]["groundSteering"]))
     return np.array(views), np.array(angles)
 
 
@@ -46,10 +55,11 @@ def error(views: Numbers, angles: Numbers, weights: Numbers) -> float:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description="Learn to steer from frames.")
-    parser.add_argument("pairs", type=Path, help="folder of dodo rec export --steering --validation")
+    parser.add_argument("drives", type=Path, help="folder of folders with frames and tables")
     parser.add_argument("model", type=Path, help="file to be written, such as model.npz")
     flags = parser.parse_args()
-    train, validation = read(flags.pairs / "train"), read(flags.pairs / "validation")
+    drives = sorted(flags.drives.iterdir())
+    train, validation = read([one for number, one in enumerate(drives) if number % 5]), read(drives[::5])
     models = {one: fitted(*train, one) for one in STIFFNESS}
     best = min(models, key=lambda one: error(*validation, models[one]))
     weights = models[best]

@@ -19,7 +19,6 @@ from dodo_dsl.opendlv.session import SessionError
 from dodo_dsl.plan.plan_json import json_text
 from dodo_dsl.plan.test_files import FilesError
 from dodo_dsl.rec.recording_filter import NothingSelected
-from dodo_dsl.rec.truth import TruthError
 from dodo_dsl.report.results import ResultsError
 from dodo_dsl.run.leases import LeaseTimeout
 from dodo_dsl.run.rigs.problems import RigProblem
@@ -40,7 +39,7 @@ def ended(error: BaseException, monkeypatch: pytest.MonkeyPatch, command: str = 
 
 USAGE = (
     UsageError, NoSuchTest, OdvdError, RecordingError, FilesError, NothingSelected, OutputExists,
-    TruthError, ResultsError,
+    ResultsError,
 )  # fmt: skip
 
 

@@ -21,9 +21,7 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import OdvdError
 from dodo_dsl.opendlv.picture_size import MAX_PIXELS
 from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.rec import truth
 from dodo_dsl.rec.frames import decoded
-from dodo_dsl.rec.truth import TruthError
 from dodo_dsl.run.protocol import Flooded, Noted
 from dodo_dsl.run.run_state import MOST_NOTES, RunState
 from dodo_dsl.run.service_protocol import read
@@ -80,14 +78,9 @@ def frame_of(path: Path) -> object:
     return FileCamera(path, 640, 480)
 
 
-def truth_of(path: Path) -> object:
-    return truth.decoded(path.read_bytes(), path.name)
-
-
 PICTURES = (load_picture, load_with_alpha, frame_of)
 REFUSED: list[tuple[str, bytes, Callable[[Path], object], str]] = [
     *((name, data, read, TOO_LARGE) for name, data in BOMBS.items() for read in PICTURES),
-    ("bomb.png", BOMBS["bomb.png"], truth_of, TOO_LARGE),
     *(("a.png", data, load_picture, "not a readable image, expected PNG or JPEG") for data in UNREADABLE),
     ("a.obj", FACES, load_obj, f"{MAX_TRIANGLES + 1} triangles"),
     ("a.obj", b" \tv 0 0 0\n" * (MAX_VERTICES + 1), load_obj, f"{MAX_VERTICES + 1} vertices"),
@@ -104,7 +97,7 @@ def test_what_unfolds_is_refused(
     tmp_path: Path, name: str, content: bytes, read: Callable[[Path], object], said: str
 ) -> None:
     (tmp_path / name).write_bytes(content)
-    with pytest.raises((InputError, TruthError, OdvdError, ValueError), match=said):
+    with pytest.raises((InputError, OdvdError, ValueError), match=said):
         read(tmp_path / name)
 
 

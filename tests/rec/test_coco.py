@@ -6,7 +6,6 @@ import cv2
 import pytest
 
 from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.rec.truth import Mark, truth_text
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, pictures, video
 
 PREFIX = "opendlv.logic.perception.Detection"
@@ -55,46 +54,11 @@ def test_frames_with_detections(drive: Path, tmp_path: Path) -> None:
     assert {len({a["id"] for a in found["annotations"]}), len(names)} == {3}
 
 
-def test_all_frames_as_jpeg(drive: Path, tmp_path: Path) -> None:
-    words = ["--all", "--pictures", "jpg", "--start", "0.45", "--labels", "3"]
+def test_frames_as_jpeg_with_the_labels_of_a_sender(drive: Path, tmp_path: Path) -> None:
+    words = ["--pictures", "jpg", "--start", "0.45", "--labels", "3"]
     answer = dodo_rec("export", drive, "--coco", "-o", tmp_path / "set", *words)
-    assert answer.stdout.endswith("7 frames with 1 boxes\n")
-    assert len(list((tmp_path / "set" / "images").glob("0-*.jpg"))) == 7
-
-
-def test_the_boxes_of_a_truth_for_every_frame(drive: Path, tmp_path: Path) -> None:
-    truth = tmp_path / "truth.json"
-    marks = [Mark("yellow", 0, 4, 8, 6), Mark("blue", 20, 10, 4, 4)]
-    truth.write_text(truth_text(marks, "desk.png", 2 * WIDTH, 2 * HEIGHT))
-    answer = dodo_rec("export", drive, "--coco", "-o", tmp_path / "set", "--truth", truth)
-    assert answer.stdout.endswith("12 frames with 24 boxes\n")
-    found = json.loads((tmp_path / "set" / "annotations.json").read_text())
-    names = {category["id"]: category["name"] for category in found["categories"]}
-    for number in range(1, 13):
-        boxes = [(names[a["category_id"]], a["bbox"]) for a in found["annotations"] if a["image_id"] == number]
-        assert boxes == [("yellow", [0, 2, 4, 3]), ("blue", [10, 5, 2, 2])]
-
-
-OTHERS = truth_text([Mark("yellow", 0, 4, 6, 3)], "", 7, 7)
-
-
-@pytest.mark.parametrize(
-    ("content", "words", "sentence"),
-    [
-        ("{", (), "truth.json:1:2: not JSON: expected a key"),
-        (OTHERS.replace('"iscrowd": 0', '"iscrowd": 1'), (), "annotations[0]: iscrowd is set"),
-        (OTHERS.replace('"image_id": 1', '"image_id": 2'), (), "annotations[0].image_id: no entry has the id 2"),
-        (OTHERS.replace('"categories": [', '"categories": [{"id": 2, "name": "x"},'), (), "two have the same id"),
-        ('{"images": []}', (), "'categories' is missing"),
-        (truth_text([], "", 7, 7), ("--labels", "3"), "--truth and --labels exclude each other"),
-        (truth_text([], "", 7, 7), (), "no boxes, expected at least one"),
-    ],
-)
-def test_a_truth_that_is_none(drive: Path, tmp_path: Path, content: str, words: tuple[str, ...], sentence: str) -> None:
-    (tmp_path / "truth.json").write_text(content)
-    answer = dodo_rec("export", drive, "--coco", "-o", tmp_path / "set", "--truth", tmp_path / "truth.json", *words)
-    assert (answer.code, answer.stdout) == (2, "") and sentence in answer.stderr
-    assert not (tmp_path / "set").exists()
+    assert answer.stdout.endswith("1 frames with 1 boxes\n")
+    assert len(list((tmp_path / "set" / "images").glob("0-*.jpg"))) == 1
 
 
 def test_boxes_are_cut_at_the_edges_of_their_frame(record: Callable[..., Path], tmp_path: Path) -> None:
@@ -112,23 +76,11 @@ def test_boxes_are_cut_at_the_edges_of_their_frame(record: Callable[..., Path], 
 
 
 def test_classes_have_their_numbers_in_every_set(record: Callable[..., Path], tmp_path: Path) -> None:
-    drives = [
-        record([*video(2), *(e for n, each in enumerate(labels) for e in cone(BEGIN, n, each, 0.25))], f"{number}.rec")
-        for number, labels in enumerate((("blue", "yellow", "ball"), ("yellow",)))
-    ]
-    answers = [
-        dodo_rec("export", *drives, "--coco", "-o", tmp_path / "set", "--validation", "50%"),
-        dodo_rec("export", drives[1], "--coco", "-o", tmp_path / "one"),
-    ]
-    assert [answer.code for answer in answers] == [0, 0]
-    found = [
-        {
-            each["name"]: each["id"]
-            for each in json.loads((tmp_path / part / "annotations.json").read_text())["categories"]
-        }
-        for part in ("set/train", "set/validation", "one")
-    ]
-    assert found == [{"ball": 1949452379, "blue": 1, "yellow": 2}] * 2 + [{"yellow": 2}]
+    labels = ("blue", "yellow", "ball")
+    path = record([*video(2), *(e for n, each in enumerate(labels) for e in cone(BEGIN, n, each, 0.25))])
+    assert dodo_rec("export", path, "--coco", "-o", tmp_path / "set").code == 0
+    found = json.loads((tmp_path / "set/annotations.json").read_text())["categories"]
+    assert {each["name"]: each["id"] for each in found} == {"ball": 1949452379, "blue": 1, "yellow": 2}
 
 
 def test_frames_without_a_key_frame_are_told(record: Callable[..., Path], tmp_path: Path) -> None:
@@ -138,7 +90,7 @@ def test_frames_without_a_key_frame_are_told(record: Callable[..., Path], tmp_pa
     assert (answer.code, answer.stderr) == (0, f"{told}dodo rec: 3 packets cannot be decoded\n")
 
 
-NOTHING = "no frame of {path} that can be decoded has a detection with a box in it; --all exports frames without them"
+NOTHING = "no frame of {path} that can be decoded has a detection with a box in it"
 
 
 @pytest.mark.parametrize(
@@ -147,7 +99,7 @@ NOTHING = "no frame of {path} that can be decoded has a detection with a box in 
         (cone(BEGIN, 0, "", 0.0), [], "the selection of {path} holds no camera frames (opendlv.proxy.ImageReading)"),
         (video(3), [], NOTHING),
         (video(3), ["--camera", "2"], "{path} holds no frames of camera 2, expected one of 0"),
-        ([*video(2), *video(2, 5, 1)], ["--all"], "{path} holds frames of the cameras 0, 1; choose one with --camera"),
+        ([*video(2), *video(2, 5, 1)], [], "{path} holds frames of the cameras 0, 1; choose one with --camera"),
         (video(3), ["--message", "1055"], "--message does not apply to --coco; choose a sender with --camera"),
         ([*video(3), *cone(5, 0, "", 0.0)], [], NOTHING),
     ],

@@ -97,8 +97,8 @@ def test_what_is_left_out_is_told(tmp_path: Path, record: Callable[..., Path]) -
     code, stdout, stderr = dodo_rec("export", path, "--csv", "-o", tmp_path / "out")
     assert (code, stdout) == (0, f"{tmp_path / 'out'}: 1 tables with 1 rows\n")
     assert stderr == (
-        "dodo rec: skipped 1 payload of opendlv.proxy.DistanceReading that cannot be decoded\n"
         "dodo rec: skipped unknown messages: 1144\n"
+        "dodo rec: skipped 1 payload of opendlv.proxy.DistanceReading that cannot be decoded\n"
     )
     assert dodo_rec("export", record([good._replace(data_type=1144)]), "--csv").code == 2
 

@@ -51,12 +51,6 @@ def read(path: Path, frames: Frames) -> dict[int, list[tuple[str, Area]]]:
     return {keys[number]: found for number, found in boxes.items()}
 
 
-def size(path: Path) -> tuple[int, int]:
-    """Width and height in pixels of the only image of a file that was read."""
-    (image,) = _objects(Node.load(path), "images")
-    return image.value["width"], image.value["height"]
-
-
 def corners(path: Path) -> Iterator[InputError]:
     """The first box that ends far outside its image, as one does that is written as two corners; the file is read."""
     root = Node.load(path)

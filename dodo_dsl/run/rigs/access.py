@@ -182,16 +182,6 @@ def _of_rig(rig: Rig, parameter: Parameter) -> Argument:
         return Argument(parameter, entry, None, problem.diagnostic)
 
 
-def judged_classes(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec) -> list[str]:
-    """The classes that a test evaluates; empty when it names none."""
-    texts = (
-        resolved(spec, use, manifests[use.uses.text], rig, {}).texts.get("classes", "")
-        for use in spec.uses
-        if use.layer == "evaluation" and use.uses.text in manifests
-    )
-    return sorted({name for text in texts for name in text.split(",") if name})
-
-
 def flags(rig: Rig) -> list[str]:
     """The rig's port, kind, limits and constants as the gantry's flags; raises RigProblem for an invalid one."""
     found = [_of_rig(rig, parameter) for parameter in load_manifests()[0]["gantry"].parameters.values()]

@@ -55,14 +55,12 @@ def test_cameras_senders_and_target_are_looked_up(empty: Path, file: str) -> Non
     shutil.copy(SHIPPED, empty / file)
     code, out, err = dodo("new", "mine", "--level", "dil", "--rec", file)
     assert (code, err) == (0, "")
-    assert f"{file}: 15.0 s, pictures of the camera with sender stamp 0\n" in out
-    assert f"judged: groundSteering of {STEERING}/0, 151 values from -0.0675461 to 0.113257\n" in out
+    assert f"{file}: 15 s, judged: groundSteering of {STEERING}/0\n" in out
     assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
     found = spec(empty, "mine")
     assert found["rec"] == found["target"] == f"../recordings/{file}"
     assert (found["video-sender"], found["target-sender"], found["clock"]) == (0, 0, "lockstep")
-    assert found["without"] == [STEERING, "opendlv.proxy.PedalPositionRequest", "opendlv.sim.Frame"]
-    assert (found["max-mean"], found["max-distance"], found["max-time"]) == (0.018, 0.090, "25 s")
+    assert (found["max-mean"], found["max-time"]) == (0.022, "25 s")
     assert (empty / "tests/recordings" / file).read_bytes() == SHIPPED.read_bytes()
 
 
@@ -74,21 +72,6 @@ def test_the_replay_shows_pictures_where_the_application_looks(empty: Path) -> N
     assert dodo("new", "mine", "--level", "dil", "--rec", "drive.rec")[0] == 0
     assert (spec(empty, "mine")["name.argb"], spec(empty, "mine")["name.bgr"]) == ("img.argb", "img.bgr")
     assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
-
-
-@pytest.mark.thorough
-def test_pictures_that_the_application_waits_for_and_the_recording_lacks(empty: Path) -> None:
-    """Such a test cannot be passed: ``new`` says so."""
-    compose = empty / "compose.yml"
-    write(empty / "drive.rec", (STEERING, 0, [0.1, 0.2] * 20))
-    warning = "warning: 'car' of the application waits for pictures, and 'drive.rec' has none, "
-    warning += "so the test cannot pass\n"
-    assert warning not in dodo("new", "blind", "--rec", "drive.rec")[1]
-    assert dodo("compile", "--check")[1] == "1 test checked: no problems\n"
-    compose.write_text(compose.read_text().replace("--cid=111", "--cid=111 --name=video0.argb"))
-    shutil.copy(SHIPPED, empty / "seen.rec")
-    assert warning not in dodo("new", "seeing", "--rec", "seen.rec")[1]
-    assert warning in dodo("new", "mine", "--rec", "drive.rec")[1]
 
 
 @pytest.mark.thorough
@@ -107,17 +90,15 @@ def test_a_recording_that_is_there_is_not_copied(empty: Path) -> None:
 
 @pytest.mark.thorough
 def test_a_recording_without_pictures_is_played_in_lockstep(empty: Path) -> None:
-    """The preferred message with enough samples is judged, and others of it are named."""
+    """The preferred message with enough samples is judged, by half of what the best constant reaches."""
     streams = [(STEERING, 3, [0.1] * 5), ("opendlv.proxy.PedalPositionRequest", 4, [0.1, 0.3] * 20)]
     write(empty / "drive.rec", *streams, ("opendlv.proxy.PedalPositionRequest", 7, [0.1] * 12))
     code, out, err = dodo("new", "mine", "--rec", "drive.rec")
     assert (code, err) == (0, "")
-    assert "drive.rec: 3.9 s, no camera\n" in out
-    assert "judged: position of opendlv.proxy.PedalPositionRequest/4, 40 values from 0.1 to 0.3\n" in out
-    assert "other sender stamps of it are 7: change 'target-sender' for them\n" in out
+    assert "drive.rec: 4 s, judged: position of opendlv.proxy.PedalPositionRequest/4\n" in out
     found = spec(empty, "mine")
     assert (found["clock"], found["align"], found["sample-times"]) == ("lockstep", "begin", "test")
-    assert (found["max-mean"], found["max-distance"], found["target-sender"]) == (0.020, 0.10, 4)
+    assert (found["max-mean"], found["target-sender"]) == (0.050, 4)
     assert dodo("compile", "--check")[0] == 0
 
 
@@ -128,11 +109,11 @@ def test_pictures_alone_have_to_be_answered(empty: Path) -> None:
     (empty / "drive.rec").write_bytes(b"".join(map(encode_frame, pictures)))
     code, out, err = dodo("new", "mine", "--level", "dil", "--rec", "drive.rec")
     assert (code, err) == (0, "")
-    assert f"judged: whether each picture is answered by {STEERING}/0, because there is no recorded signal\n" in out
+    assert f"judged: answers to pictures by {STEERING}\n" in out
     assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
     found = yaml.safe_load((empty / "tests/mine/mine.dodo.yml").read_text())
     assert (found["clock"], found["evaluation"]["answers"]) == ("lockstep", {"uses": "responds", "with": {
-        "message": STEERING, "field": "groundSteering", "min": "-38 deg", "max": "38 deg", "min-share": "95 %",
+        "message": STEERING, "field": "groundSteering", "min-share": "95 %",
         "max-time": "14 s"}})  # fmt: skip
 
 
@@ -149,7 +130,6 @@ def test_what_is_written_compiles(empty: Path) -> None:
         (empty / name).write_bytes(b"".join(pictures[:12] if number else gap))
         code, out, err = dodo("new", f"t{number}", f"--rec={name}")
         assert (code, err) == (0, "")
-        assert "320x240" not in out or "warning: the pictures of" in out
     streams: tuple[tuple[str, list[float], int], ...] = (
         (STEERING, [0.1] * 10, 1_000),
         (STEERING, [float("nan")] * 10 + [1e30, -1e-12], 59 * 60 * 10**6),
@@ -193,10 +173,7 @@ def test_a_matrix_of_recordings_makes_one_test_over_all(empty: Path) -> None:
             "'few.rec' has no signal to judge, expected 10 or more messages of one of opendlv.proxy.",
         ),
         (["--rec", "empty.rec"], "'empty.rec' has no messages to play"),
-        (
-            ["--rec", "break.rec"],
-            "'break.rec' takes 1,080 minutes with a break of 120 minutes, and a test 24 h with one of",
-        ),
+        (["--rec", "bag.mcap"], "'bag.mcap' is a bag of ROS 2, expected a recording: dodo rec import bag.mcap"),
         (
             ["--rec", "other.rec"],
             "'other.rec' has no signal to judge, expected 10 or more messages of one of opendlv.p",
@@ -209,52 +186,12 @@ def test_a_matrix_of_recordings_makes_one_test_over_all(empty: Path) -> None:
 @pytest.mark.thorough
 def test_what_makes_no_test_is_said(empty: Path, words: list[str], said: str) -> None:
     write(empty / "few.rec", (STEERING, 0, [0.1] * 9))
-    write(empty / "break.rec", (STEERING, 0, [0.1] * 10), step=2 * 3600 * 10**6)
     write(empty / "empty.rec")
     write(empty / "other.rec", ("opendlv.proxy.AngleRequest", 0, [0.1] * 10))
     before = contents(empty)
     code, out, err = dodo("new", "mine", *words)
     assert (code, out, contents(empty)) == (2, "", before)
     assert err.startswith(f"dodo new: {said}")
-
-
-@pytest.mark.parametrize(
-    ("values", "limit"),
-    [([0.5] * 10, "0.050"), ([0.0] * 10, "0.10"), ([0.0, 300.0] * 5, "30"), ([0.0] * 19 + [1.0], "0.025")],
-)
-@pytest.mark.thorough
-def test_limits_have_two_digits_and_are_never_zero(empty: Path, values: list[float], limit: str) -> None:
-    write(empty / "drive.rec", (STEERING, 0, values))
-    assert dodo("new", "mine", "--rec", "drive.rec")[0] == 0
-    assert f"max-mean: {limit} " in (empty / "tests/mine/mine.dodo.yml").read_text()
-
-
-@pytest.mark.thorough
-def test_sample_times_of_several_drives_become_those_of_receipt(empty: Path) -> None:
-    """As in a public recording, in which recorded cones were processed again; the original stays as it is."""
-    write(empty / "drive.rec", (STEERING, 0, [0.1, 0.3] * 20), ("opendlv.proxy.PedalPositionRequest", 0, [0.1] * 40))
-    envelopes = list(read_envelopes(empty / "drive.rec"))
-    other = [each._replace(sample_time=each.sample_time - 1500 * 10**6) for each in envelopes[40:]]
-    (empty / "drive.rec").write_bytes(b"".join(map(encode_frame, [*envelopes[:40], *other])))
-    code, out, _ = dodo("new", "mine", "--rec", "drive.rec")
-    assert code == 0
-    assert "drive.rec: 3.9 s, no camera\n" in out
-    assert "its sample times are of several drives: the test has a copy" in out
-    found = spec(empty, "mine")
-    assert found["target"] == "../recordings/drive-as-received.rec"
-    assert list(read_envelopes(empty / "tests/recordings/drive-as-received.rec")) == envelopes
-    assert dodo("compile", "--check")[0] == 0
-
-
-@pytest.mark.thorough
-def test_a_pause_is_not_shortened_and_another_stamp_than_the_applications_is_second(empty: Path) -> None:
-    write(empty / "drive.rec", (STEERING, 7, [0.1, 0.2] * 20), (STEERING, 0, [0.1, 0.3] * 10))
-    envelopes = list(read_envelopes(empty / "drive.rec"))
-    late = [e._replace(**dict.fromkeys(("sent", "received", "sample_time"), e.sent + 3_000_000)) for e in envelopes]
-    (empty / "drive.rec").write_bytes(b"".join(map(encode_frame, [*envelopes, *late[20:40]])))
-    assert dodo("new", "mine", "--rec", "drive.rec")[0] == 0
-    found = spec(empty, "mine")
-    assert (found["target-sender"], found["max-gap"]) == (0, "2 s")
 
 
 @pytest.mark.parametrize("time", [0, 1])

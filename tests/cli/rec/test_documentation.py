@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.cli import rec
-from dodo_dsl.rec.truth import Mark, truth_text
-from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, video
+from tests.rec.conftest import BEGIN, dodo_rec, message, video
 
 PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "recordings.md").read_text()
 SHOWN = re.findall(r"^ +dodo rec (.*?)(?:  |$)", PAGE + rec.EXAMPLES + rec._EXPORT, re.MULTILINE)
@@ -34,9 +33,8 @@ def test_the_lines_shown_run(
         message("opendlv.logic.perception.DetectionBoundingBox", BEGIN + 100_000, stamp, width=1, height=1)
         for stamp in (0, 3)
     ]
-    for name in ("drive.rec", "old.rec", "desk.rec"):
+    for name in ("drive.rec", "old.rec"):
         record([*video(4), *others, *box], name)
-    (tmp_path / "desk.json").write_text(truth_text([Mark("yellow", 1, 2, 3, 4)], "desk.png", WIDTH, HEIGHT))
     if words.startswith("import"):
         assert dodo_rec("export", "drive.rec", "--ros", "-o", "recorded").code == 0
     code, stdout, stderr = dodo_rec(*shlex.split(words))

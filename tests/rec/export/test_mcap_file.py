@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -29,7 +28,7 @@ from dodo_dsl.rec.mcap import topic
 from tests.opendlv.test_against_libcluon import some_value
 from tests.rec.conftest import BEGIN, MESSAGES, dodo_rec, message, video
 
-OWN = ("/camera/", "/picture/", "/tf", "/log", "/scan/", "/odom/", "/estimate/")
+OWN = ("/camera/", "/picture/", "/tf")
 
 
 def read(path: Path) -> dict[str, list[tuple[Any, Any]]]:
@@ -181,17 +180,13 @@ def test_times_of_messages(tmp_path: Path, record: Callable[..., Path]) -> None:
     ]
 
 
-def test_poses_and_log(tmp_path: Path, record: Callable[..., Path]) -> None:
+def test_poses(tmp_path: Path, record: Callable[..., Path]) -> None:
     half = math.sqrt(0.5)
     frame = {"x": 1.5, "y": -2.0, "z": 0.25, "qz": half, "qw": half}
     envelopes = [
         message("opendlv.sim.Frame", BEGIN, 2, **frame),
         message("opendlv.sim.Frame", BEGIN + 1, 2),
         message("opendlv.sim.Frame", BEGIN + 2, 2, x=math.nan),
-        *(
-            message("opendlv.system.LogMessage", BEGIN, 5, level=n, description=f"level {n}")
-            for n in (0, 3, 4, 6, 7, 9)
-        ),
     ]
     beside = assert_same_values(record(envelopes), tmp_path, "--messages=1.0")
     first, second = [decoded for _, decoded in beside["/tf"]]
@@ -199,38 +194,6 @@ def test_poses_and_log(tmp_path: Path, record: Callable[..., Path]) -> None:
     assert [getattr(first.translation, axis) for axis in "xyz"] == [1.5, -2.0, 0.25]
     assert [getattr(first.rotation, axis) for axis in "xyzw"] == pytest.approx([0, 0, half, half])
     assert [getattr(second.rotation, axis) for axis in "xyzw"] == [0, 0, 0, 1]
-    log = [decoded for _, decoded in beside["/log"]]
-    names = log[0].DESCRIPTOR.fields_by_name["level"].enum_type.values_by_number
-    assert [(names[each.level].name, each.message, each.name) for each in log] == [
-        ("FATAL", "level 0", "sender 5"),
-        ("ERROR", "level 3", "sender 5"),
-        ("WARNING", "level 4", "sender 5"),
-        ("INFO", "level 6", "sender 5"),
-        ("DEBUG", "level 7", "sender 5"),
-        ("UNKNOWN", "level 9", "sender 5"),
-    ]
-
-
-def test_what_robots_measure_and_believe(tmp_path: Path, record: Callable[..., Path]) -> None:
-    half, ranges = math.sqrt(0.5), np.array([1, math.inf, 2], "<f4").tobytes()
-    scan = {"angleMin": -0.5, "angleIncrement": 0.5, "ranges": ranges}
-    odometry = {"x": 1.0, "y": 2.0, "yaw": math.pi / 2}
-    envelopes = [
-        message("robot.PlanarScan", BEGIN, 3, **scan),
-        message("robot.PlanarScan", BEGIN, 3, ranges=b"123"),
-        message("robot.OdometryReading", BEGIN, **odometry),
-        message("robot.OdometryReading", BEGIN, yaw=math.inf),
-        message("robot.PoseEstimate", BEGIN, x=1, qz=half, qw=half),
-    ]
-    beside = assert_same_values(record(envelopes), tmp_path, "--messages=1.0")
-    ((_, laser),) = beside["/scan/3"]
-    assert (laser.frame_id, laser.start_angle, laser.end_angle, *laser.ranges) == ("frame-3", -0.5, 0.5, 1, math.inf, 2)
-    poses = [decoded for name in ("/odom/0", "/estimate/0") for _, decoded in beside[name]]
-    assert [(each.frame_id, each.pose.position.x, each.pose.position.y) for each in poses] == [
-        ("odom", 1.0, 2.0),
-        ("world", 1.0, 0.0),
-    ]
-    assert [each.pose.orientation.z for each in poses] == pytest.approx([half, half])
 
 
 ANGLE = st.floats(-3.125, 3.125, width=32)
@@ -281,8 +244,7 @@ def test_fields_that_are_absent_or_repeated_have_libcluon_s_values(tmp_path: Pat
     """The first of equal fields counts, which for protobuf is the last."""
     distance = b"\x0d\x00\x00\x80\x3f", b"\x0d\x00\x00\x00\x40"
     envelopes = [Envelope(1039, b"".join(distance), 1, 2, 3, 0), Envelope(1103, b"", 1, 2, 3, 0)]
-    found = assert_same_values(record(envelopes), tmp_path, "--messages=1.0")
-    assert [decoded.message for _, decoded in found["/log"]] == [""]
+    assert assert_same_values(record(envelopes), tmp_path, "--messages=1.0") == {}
     ((_, reading),) = read(tmp_path / "out.mcap")["/opendlv/proxy/DistanceReading/0"]
     assert reading.distance == 1.0
 
@@ -294,8 +256,8 @@ def test_what_is_left_out_is_told(tmp_path: Path, record: Callable[..., Path]) -
     assert (code, stdout) == (0, f"{target}: 1 messages, and 0 of them for Foxglove, too\n")
     assert stderr == (
         f"dodo rec: {path}: skipped 2 bytes at byte 0: no frame begins here\n"
-        "dodo rec: skipped 1 payload of opendlv.proxy.DistanceReading that cannot be decoded\n"
         "dodo rec: skipped unknown messages: 1144\n"
+        "dodo rec: skipped 1 payload of opendlv.proxy.DistanceReading that cannot be decoded\n"
     )
     assert list(read(target)) == ["/opendlv/proxy/DistanceReading/0"]
     alone = dodo_rec("export", record([good._replace(data_type=1144)]), "--mcap", "-o", tmp_path / "none.mcap")

@@ -11,27 +11,11 @@ import numpy as np
 import pytest
 
 from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec.video import MOST_GAP
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, pictures, video
 
 STEPS = (0, 100_000, 133_333, 240_001, 1_000_000, 1_000_001, 2_345_678)
-
-
-def units(packet: bytes) -> list[bytes]:
-    """The NAL units behind start codes (ITU-T H.264, annex B)."""
-    return [unit.rstrip(b"\0") for unit in packet.split(b"\0\0\1") if unit.rstrip(b"\0")]
-
-
-def units_of_sample(sample: bytes) -> list[bytes]:
-    """The NAL units behind lengths of 4 bytes (ISO/IEC 14496-15)."""
-    found = []
-    while sample:
-        size = int.from_bytes(sample[:4], "big")
-        found.append(sample[4 : 4 + size].rstrip(b"\0"))
-        sample = sample[4 + size :]
-    return found
 
 
 def demuxed(path: Path) -> list[tuple[int, bool, bytes]]:
@@ -48,29 +32,22 @@ def shown(path: Path) -> list[np.ndarray[Any, Any]]:
         return [frame.to_ndarray(format="bgr24") for frame in container.decode(video=0)]
 
 
-def data_of(envelope: Envelope) -> bytes:
-    data: bytes = MessageSet.standard().decode(envelope.data_type, envelope.payload).data
-    return data
+def times(path: Path) -> list[int]:
+    return [time for time, _, _ in demuxed(path)]
 
 
-def assert_same_packets(path: Path, envelopes: list[Envelope]) -> None:
-    found = demuxed(path)
-    assert [units_of_sample(data) for _, _, data in found] == [units(data_of(each)) for each in envelopes]
-    begin = envelopes[0].sample_time
-    assert [time for time, _, _ in found] == [each.sample_time - begin for each in envelopes]
+def assert_shown(path: Path, expected: list[np.ndarray[Any, Any]]) -> None:
+    for frame, picture in zip(shown(path), expected, strict=True):
+        assert abs(frame.astype(int) - picture).max() <= 10
 
 
-def test_packets_and_sample_times_are_those_of_the_recording(record: Callable[..., Path], tmp_path: Path) -> None:
+def test_frames_are_shown_at_their_sample_times(record: Callable[..., Path], tmp_path: Path) -> None:
     envelopes = [each._replace(sample_time=BEGIN + step) for each, step in zip(video(7), STEPS, strict=True)]
     target = tmp_path / "new" / "drive.mp4"
     answer = dodo_rec("export", record(envelopes), "--video", "-o", target)
-    assert answer == (0, f"{target}: 7 frames of {WIDTH} x {HEIGHT} pixels, as recorded\n", "")
-    assert_same_packets(target, envelopes)
-    assert [key for _, key, _ in demuxed(target)] == [True, *[False] * 4, True, False]
-    for frame, picture in zip(shown(target), pictures(7), strict=True):
-        assert abs(frame.astype(int) - picture).max() <= 6
-    with av.open(str(target)) as container:
-        assert container.metadata["creation_time"].startswith("2023-11-14T22:13:20")
+    assert answer == (0, f"{target}: 7 frames of {WIDTH} x {HEIGHT} pixels\n", "")
+    assert times(target) == list(STEPS)
+    assert_shown(target, pictures(7))
 
 
 @pytest.mark.slow
@@ -78,7 +55,8 @@ def test_a_real_drive(shared_data: Callable[[str], Path], tmp_path: Path) -> Non
     path, target = shared_data("track-1-2025-05-08.rec"), tmp_path / "track.mp4"
     assert dodo_rec("export", path, "--video", "-o", target).code == 0
     with Recording(path) as recording:
-        assert_same_packets(target, list(recording.envelopes()))
+        sampled = [each.sample_time for each in recording.envelopes(recording.rows(messages=[1055]))]
+    assert times(target) == [time - sampled[0] for time in sampled]
 
 
 def test_what_comes_before_the_first_key_frame_or_is_broken_is_told(
@@ -89,31 +67,27 @@ def test_what_comes_before_the_first_key_frame_or_is_broken_is_told(
     path, target = record([*envelopes, *broken], before=b"??"), tmp_path / "out.mp4"
     answer = dodo_rec("export", path, "--video", "-o", target)
     assert answer.code == 0
-    assert answer.stderr.endswith("5 of 12 packets cannot be decoded or come before the first key frame\n")
+    assert answer.stderr.endswith("5 packets cannot be decoded\n")
     assert "skipped 2 bytes" in answer.stderr
-    assert_same_packets(target, envelopes[3:])
+    assert_shown(target, pictures(12)[5:])
 
 
 def test_times_out_of_order_and_far_apart(record: Callable[..., Path], tmp_path: Path) -> None:
-    times = [10, 20, 15, 30, 30 + 2 * MOST_GAP]
-    path = record([each._replace(sample_time=time) for each, time in zip(video(5), times, strict=True)])
-    answer = dodo_rec("export", path, "--video", "-o", tmp_path / "out.mp4")
-    said = "moved 2 frames, as sample times do not rise, or are more than 30 minutes apart"
-    assert answer.stderr == f"dodo rec: {said}\n"
-    assert [time for time, _, _ in demuxed(tmp_path / "out.mp4")] == [0, 10, 11, 20, 20 + MOST_GAP]
+    sampled = [10, 20, 15, 30, 30 + 2 * MOST_GAP]
+    path = record([each._replace(sample_time=time) for each, time in zip(video(5), sampled, strict=True)])
+    assert dodo_rec("export", path, "--video", "-o", tmp_path / "out.mp4").stderr == ""
+    assert times(tmp_path / "out.mp4") == [0, 10, 11, 20, 20 + MOST_GAP]
 
 
-def test_other_formats_are_encoded_again(record: Callable[..., Path], tmp_path: Path) -> None:
+def test_other_formats(record: Callable[..., Path], tmp_path: Path) -> None:
     jpegs = [cv2.imencode(".jpg", picture)[1].tobytes() for picture in pictures(4)]
     envelopes = [
         message("opendlv.proxy.ImageReading", BEGIN + number * 50_000, data=data, format="mjpg")
         for number, data in enumerate(jpegs)
     ]
-    answer = dodo_rec("export", record(envelopes), "--video", "-o", tmp_path / "out.mp4")
-    assert answer.stdout.endswith(f"out.mp4: 4 frames of {WIDTH} x {HEIGHT} pixels, encoded again\n")
-    assert [time for time, _, _ in demuxed(tmp_path / "out.mp4")] == [0, 50_000, 100_000, 150_000]
-    for frame, picture in zip(shown(tmp_path / "out.mp4"), pictures(4), strict=True):
-        assert abs(frame.astype(int) - picture).max() <= 6
+    assert dodo_rec("export", record(envelopes), "--video", "-o", tmp_path / "out.mp4").code == 0
+    assert times(tmp_path / "out.mp4") == [0, 50_000, 100_000, 150_000]
+    assert_shown(tmp_path / "out.mp4", pictures(4))
 
 
 def jpeg(width: int, time: int) -> Envelope:
@@ -125,16 +99,10 @@ def jpeg(width: int, time: int) -> Envelope:
     ("envelopes", "words", "text"),
     [
         (video(5)[1:5], (), "no frame of {path} can be decoded"),
-        ([*video(2), jpeg(WIDTH, BEGIN)], (), "{path}: a frame of format 'mjpg' follows such of h264, and both"),
-        ([jpeg(64, 1), jpeg(32, 2)], (), "{path}: a frame of 32 x 48 pixels follows such of 64 x 48, and both"),
+        ([jpeg(64, 1), jpeg(32, 2)], (), "{path}: a frame of 32 x 48 pixels follows such of 64 x 48"),
         ([jpeg(33, 1)], (), "{path}: h264 needs an even width and height, not 33 x 48"),
         ([*video(1), *video(1, 5, 3)], (), "{path} holds frames of the cameras 0, 3; choose one with --camera"),
         (video(1), ("--message", "1055"), "--message does not apply to --video; choose a sender with --camera"),
-        (
-            [message("opendlv.proxy.ImageReading", 1, data=b"\0\0\1\x65abc", format="h264")],
-            (),
-            "{path}: frames cannot be put into a video",
-        ),
     ],
 )
 def test_what_cannot_be_exported(
@@ -143,7 +111,7 @@ def test_what_cannot_be_exported(
     path = record(envelopes)
     answer = dodo_rec("export", path, "--video", "-o", tmp_path / "out.mp4", *words)
     assert (answer.code, answer.stdout) == (2, "")
-    assert answer.stderr.startswith(f"dodo rec: {text.format(path=path)}")
+    assert f"dodo rec: {text.format(path=path)}" in answer.stderr
     assert [entry.name for entry in tmp_path.iterdir()] == ["drive.rec"]
 
 
