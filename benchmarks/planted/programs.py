@@ -77,7 +77,7 @@ def kept(folder: Path) -> list[tuple[int, str]]:
     """Numbers and outcomes of the drives that a search has kept so far, in order."""
     store = folder / "dodo-report" / "search" / "planted" / "search.journal"
     lines = [json.loads(line) for line in store.read_text().splitlines()] if store.exists() else []
-    drives = [line["user_attr"]["drive"] for line in lines if "drive" in line.get("user_attr", ())]
+    drives = [line["user_attrs"]["drive"] for line in lines if "drive" in line.get("user_attrs", ())]
     return sorted((drive["number"], drive["outcome"]) for drive in drives)
 
 

@@ -50,12 +50,6 @@ def seconds(text: str) -> float:
     return _checked(text, value, 0.0 < value <= most, f"a time in seconds above 0 and at most {most:g}")
 
 
-def minutes(text: str) -> float:
-    """A duration in minutes, at most ten days."""
-    value, most = finite(text), _MOST_SECONDS / 60
-    return _checked(text, value, 0.0 < value <= most, f"a time in minutes above 0 and at most {most:g}")
-
-
 def shard(text: str) -> tuple[int, int]:
     """``I/N``: the part of several that is meant, from 1 on, and how many there are."""
     index, _, total = text.partition("/")

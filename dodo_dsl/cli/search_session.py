@@ -1,12 +1,11 @@
-"""A session of ``dodo search`` or ``dodo tune`` with live progress."""
+"""A session of ``dodo search`` or ``dodo tune``."""
 
 import argparse
-import time
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO, cast
+from typing import TextIO, cast
 
 from dodo_dsl import compiler
 from dodo_dsl.cli import selection
@@ -15,7 +14,7 @@ from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.forecast import expectation
 from dodo_dsl.cli.loading import Loading, loading
 from dodo_dsl.cli.numbers import positive, seed
-from dodo_dsl.cli.progress import NoProgress, about, count
+from dodo_dsl.cli.progress import NoProgress
 from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors
 from dodo_dsl.diagnostics import has_errors, ordered, told_once
@@ -23,12 +22,12 @@ from dodo_dsl.run.backends import CombinedBackends
 from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
 from dodo_dsl.search.drives import Drives, KeptBackends, end_like_interrupt
-from dodo_dsl.search.store import Drive, Store
+from dodo_dsl.search.store import Store
 from dodo_dsl.search.study import Study
 from dodo_dsl.spec.load import Settings
 from dodo_dsl.spec.model import LOCKSTEP
 from dodo_dsl.spec.registry import SUFFIX
-from dodo_dsl.terminal import printable, unescaped
+from dodo_dsl.terminal import printable
 
 INTERRUPTED = "interrupted: the same command goes on from here\n"
 
@@ -69,23 +68,16 @@ class SearchSession:
             raise UsageError("the above cannot be compiled")
         return made
 
-    @contextmanager
-    def drives(
-        self, study: Study, store: Store, folder: Path, deadline: float | None, total: int | None
-    ) -> Iterator[Drives]:
-        """Drives by processes, with progress of ``total`` of them, None if time ends them."""
+    def drives(self, study: Study, store: Store, folder: Path, shared: bool = False) -> Drives:
+        """Drives by processes."""
         deployment, options = study.checked.deployment, self.options
         backends = CombinedBackends(
-            options.backend, deployment.cids, isolation=options.isolation, descriptors=(self.load.descriptor,),
+            "process", deployment.cids, isolation=options.isolation, descriptors=(self.load.descriptor,),
             loaded=self.load.take,
         )  # fmt: skip
         order = schedule(options.jobs, expectation(backends.name))
-        progress = SearchProgress(self.stdout, total, deadline)
-        try:
-            kept = KeptBackends(backends)
-            yield Drives(study.checked, store, kept, order, self.work, progress, folder, deadline, 1 if deadline else 8)
-        finally:
-            progress.close()
+        progress = _Lines(self.stdout)
+        return Drives(study.checked, store, KeptBackends(backends), order, self.work, progress, folder, shared)
 
 
 @contextmanager
@@ -98,50 +90,10 @@ def session(options: argparse.Namespace, stdout: TextIO) -> Iterator[SearchSessi
         yield SearchSession(options, cast(TextIO, UninterruptedStream(stdout)), folder.path, load)
 
 
-class SearchProgress(NoProgress):
-    """Shows each drive in a line, or in one that moves on a terminal.
-
-    ``total`` drives are wanted; without it the search ends by time, at ``deadline`` of the monotonic clock.
-    """
-
-    def __init__(self, stream: TextIO, total: int | None, deadline: float | None) -> None:
-        self._stream, self._total, self._deadline = stream, total, deadline
-        self._start = time.monotonic()
-        self._driven = 0
-        self._status = _status(stream) if stream.isatty() else None
-
-    def close(self) -> None:
-        if self._status is not None:
-            self._status.stop()
-        self._stream.flush()
+class _Lines(NoProgress):
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
 
     def note(self, text: str) -> None:
         self._stream.write(f"{printable(text)}\n")
         self._stream.flush()
-
-    def driven(self, drive: Drive, known: Collection[Drive]) -> None:
-        """Shows a drive of this command, and counts all that are known."""
-        self._driven += 1
-        now = time.monotonic() - self._start
-        total = self._total if self._total and len(known) <= self._total else None
-        failed = count(sum(one.outcome == "failed" for one in known), "failure")
-        worst = min((one.margin for one in known if one.margin is not None), default=None)
-        line = f"{len(known)}{f' of {total}' if total else ''} drives, {failed}"
-        line += "" if worst is None else f", worst margin {worst:.3f}"
-        ends = [] if self._deadline is None else [max(self._deadline - self._start - now, 0.0)]
-        ends += [now / self._driven * (total - len(known))] if total else []
-        line += f", {about(min(ends))} to go" if ends else ""
-        if self._status is not None:
-            self._status.update(line)
-        else:
-            shown = "" if drive.margin is None else f", margin {drive.margin:.3f}"
-            self.note(f"[{now:6.1f} s] {drive.outcome}{shown}; {line}")
-
-
-def _status(stream: TextIO) -> Any:
-    from rich.console import Console
-    from rich.status import Status
-
-    status = Status("starting", console=Console(file=unescaped(stream)))
-    status.start()
-    return status

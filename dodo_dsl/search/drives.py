@@ -1,14 +1,13 @@
 """Drives of a search or a tuning: points compiled as tests and run in rounds, those of the store only once."""
 
 import asyncio
-import itertools
+import random
 import shutil
 import signal
-import time
-from collections.abc import Awaitable, Callable, Collection, Coroutine, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from dodo_dsl import compiler
 from dodo_dsl.check.resolve import ResolvedTest
@@ -29,19 +28,14 @@ from dodo_dsl.spec.vary import Values
 
 _REPEAT = "#"
 """No name of a range."""
+_A_CORE = 8
+"""Drives of a round for each core."""
 _RETRIES = 1
 """A drive that ended in error is driven once more, and left out when it does so again."""
 
 
 class Interrupted(Exception):
     """Ctrl-C or a signal ended the drives; everything until then is kept."""
-
-
-class DriveProgress(Progress, Protocol):
-    """Shows how drives go on."""
-
-    def driven(self, drive: Drive, known: Collection[Drive]) -> None:
-        """One has ended; ``known`` are all until then, also those of earlier commands and of other workers."""
 
 
 class KeptBackends:
@@ -92,7 +86,7 @@ def drive_name(values: Values, repeat: int = 1) -> dict[str, str]:
 
 @dataclass
 class Drives:
-    """Drives points in rounds of ``a_core`` drives a core; none begins after ``deadline`` of the monotonic clock.
+    """Drives points in rounds, which are short where the store is ``shared`` with other workers.
 
     ``work`` takes compiled tests, and ``folder`` what drives that did not pass say. ``known`` are all drives so far.
     """
@@ -102,15 +96,10 @@ class Drives:
     backends: KeptBackends
     order: Schedule
     work: Path
-    progress: DriveProgress
+    progress: Progress
     folder: Path
-    deadline: float | None = None
-    a_core: int = 8
+    shared: bool = False
     known: dict[str, Drive] = field(default_factory=dict)
-
-    @property
-    def is_over(self) -> bool:
-        return self.deadline is not None and time.monotonic() >= self.deadline
 
     def run(self, work: Coroutine[Any, Any, None]) -> bool:
         """Does work that drives, and closes the backends. Whether an interrupt ended it early."""
@@ -122,40 +111,31 @@ class Drives:
             self.backends.end()
         return False
 
-    async def drive(self, points: Sequence[SearchPoint], first: int | None = None) -> None:
-        """Drives the points, as far as the limits allow; those with the same name share a drive.
-
-        They are numbered from ``first`` on, else as the store does. Raises Interrupted.
-        """
+    async def drive(self, points: Sequence[SearchPoint], first: int) -> None:
+        """Drives the points, numbered from ``first`` on; those with the same name share a drive. Raises Interrupted."""
         missing: dict[str, tuple[int, SearchPoint]] = {}
-        for number, point in enumerate(points, first or 0):
+        for number, point in enumerate(points, first):
             missing.setdefault(point_text(point.name), (number, point))
         size = self._size(points)
         while True:
             drives = self.store.known([point.name for _, point in missing.values()])
             self.known |= {name: drive for name, drive in zip(missing, drives, strict=True) if drive}
             missing = {name: one for name, one in missing.items() if name not in self.known}
-            if not missing or self.is_over:
+            if not missing:
                 return
-            claims = ((*one, self.store.claim(one[1].name)) for one in missing.values())
-            free = ((n if first is not None else claim, point) for n, point, claim in claims if claim is not None)
-            if claimed := dict(itertools.islice(free, size)):
-                await self._round(claimed)
-            else:
-                end_like_interrupt()
-                self.store.wait()
+            # workers that begin at different points hardly ever make the same drive
+            begin = random.randrange(len(missing)) if self.shared else 0  # noqa: S311
+            await self._round(dict([*missing.values()][begin : begin + size]))
 
     def _size(self, points: Sequence[SearchPoint]) -> int:
         """How many drives a round has."""
-        size = max(1, int(self.order.capacity)) * self.a_core
+        size = max(1, int(self.order.capacity)) * (1 if self.shared else _A_CORE)
         on_host = any(point.spec.isolation == "host" for point in points)
         return min(size, len(self.checked.deployment.cids)) if on_host else size
 
     async def _round(self, points: dict[int, SearchPoint]) -> None:
         folder = self.work / f"round-{min(points)}"
         jobs = self._jobs(points, folder)
-        for job in jobs.values():
-            shutil.rmtree(job.report, ignore_errors=True)  # what a killed command left of the same drive
         by_slug = {job.plan.slug: number for number, job in jobs.items()}
         runner = Runner(self.progress, self.backends, self.order, Policy(retries=_RETRIES))
 
@@ -163,8 +143,10 @@ class Drives:
             if not runner.interrupted:
                 number = by_slug[outcome.slug]
                 self._keep(number, points[number], outcome)
-                if outcome.outcome == "passed":
-                    shutil.rmtree(job.report, ignore_errors=True)
+                if outcome.outcome != "passed" and job.report.exists():
+                    self.folder.mkdir(parents=True, exist_ok=True)
+                    shutil.rmtree(self.folder / outcome.slug, ignore_errors=True)
+                    shutil.move(job.report, self.folder / outcome.slug)
 
         await runner.run(list(jobs.values()), take)
         end_like_interrupt()
@@ -177,7 +159,9 @@ class Drives:
         drive = Drive(number, point.name, outcome.outcome, worst_margin(outcome), outcome.reason, checks)
         self.store.add(drive)
         self.known[point_text(point.name)] = drive
-        self.progress.driven(drive, self.known.values())
+        margin = "" if drive.margin is None else f", margin {drive.margin:.3f}"
+        failed = sum(one.outcome == "failed" for one in self.known.values())
+        self.progress.note(f"drive {number}: {drive.outcome}{margin}; {failed} of {len(self.known)} failed")
 
     def _jobs(self, points: dict[int, SearchPoint], folder: Path) -> dict[int, Job]:
         tests = {number: self._test(number, point) for number, point in points.items()}
@@ -188,7 +172,7 @@ class Drives:
         plans = {plan.slug: plan for plan in made.compiled.suite.plans}
         slugs = {number: test.spec.slug for number, test in tests.items()}
         return {
-            n: Job(plans[slug], folder / slug, self.folder / slug, points[n].spec.slug, work=folder)
+            n: Job(plans[slug], folder / slug, folder / "report" / slug, points[n].spec.slug, work=folder)
             for n, slug in slugs.items()
         }
 

@@ -7,7 +7,6 @@ from typing import Any
 
 from dodo_dsl.search.space import Space
 from dodo_dsl.search.store import Drive
-from dodo_dsl.terminal import printable
 
 VERSION = 1
 CONFIDENCE = 0.95
@@ -16,10 +15,7 @@ _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?")
 
 @dataclass(frozen=True)
 class Influence:
-    """How much a range matters: Spearman's rank correlation of its value with the margin, in [-1, 1].
-
-    For a list of values it is the correlation ratio of the margins' ranks, in [0, 1].
-    """
+    """How much a range of numbers matters: Spearman's rank correlation of its value with the margin, in [-1, 1]."""
 
     name: str
     correlation: float
@@ -56,9 +52,9 @@ class Shrunk:
 class Findings:
     """Of a sweep; ``rate`` is the share of ``judged`` drives that failed, with the ends of its interval.
 
-    ``proposed`` are the judged drives of the optimiser, which looks for failures, so that they count in no rate.
-    ``errors`` are drives without an answer, which are left out, and ``left_out`` has their reasons. ``worst`` is None
-    if no drive was judged.
+    ``proposed`` are the judged drives at the ends of ranges, where failures are expected, so that they count in no
+    rate. ``errors`` are drives without an answer, which are left out, and ``left_out`` has their reasons. ``worst`` is
+    None if no drive was judged.
     """
 
     test: str
@@ -98,9 +94,15 @@ def is_alike(one: Drive, other: Drive) -> bool:
 
 
 def find(
-    test: str, seed: int, space: Space, nominal: Drive | None, swept: Sequence[Drive], proposed: Sequence[Drive] = ()
+    test: str,
+    seed: int,
+    space: Space,
+    nominal: Drive | None,
+    swept: Sequence[Drive],
+    proposed: Sequence[Drive] = (),
+    ended_early: bool = False,
 ) -> Findings:
-    """What the drives of a sweep and those that the optimiser proposed say."""
+    """What the drives of a sweep and those at the ends of ranges say."""
 
     def of(drives: Sequence[Drive], *outcomes: str) -> list[Drive]:
         return [drive for drive in drives if drive.outcome in outcomes]
@@ -125,6 +127,7 @@ def find(
         worst=min((*judged, *further), key=_margin, default=None),
         failures=tuple(failures_of([*failed, *of(further, "failed")])),
         left_out=tuple(failures_of(left_out)),
+        ended_early=ended_early,
     )
 
 
@@ -151,35 +154,15 @@ def failures_of(failed: Sequence[Drive]) -> list[SearchFailure]:
     return sorted(found, key=lambda failure: -failure.drives)
 
 
-def _influences(space: Space, judged: Sequence[Drive]) -> list[Influence]:
+def _influences(space: Space, judged: Sequence[Drive]) -> Iterator[Influence]:
+    from scipy.stats import spearmanr
+
     margins = [_margin(drive) for drive in judged]
-    if len(set(margins)) < 2:
-        return [Influence(one.name, 0.0, one.text) for one in space.ranges]
-    from scipy.stats import rankdata, spearmanr
-
-    ranks = rankdata(margins)
-    found = []
     for one in space.ranges:
-        texts = [drive.values[one.name] for drive in judged]
-        if len(set(texts)) < 2:
-            strength = 0.0
-        elif one.is_list:
-            strength = _correlation_ratio(texts, list(map(float, ranks)))
-        else:
-            numbers = [float(one.number(text)) for text in texts]
-            strength = float(spearmanr(numbers, margins).statistic)
-        found.append(Influence(one.name, strength, one.text))
-    return found
-
-
-def _correlation_ratio(groups: Sequence[str], ranks: Sequence[float]) -> float:
-    mean = sum(ranks) / len(ranks)
-    total = sum((rank - mean) ** 2 for rank in ranks)
-    between = 0.0
-    for group in set(groups):
-        own = [rank for rank, of in zip(ranks, groups, strict=True) if of == group]
-        between += len(own) * (sum(own) / len(own) - mean) ** 2
-    return float((between / total) ** 0.5)
+        if not one.is_list:
+            numbers = [float(one.number(drive.values[one.name])) for drive in judged]
+            is_known = len(set(margins)) > 1 and len(set(numbers)) > 1
+            yield Influence(one.name, float(spearmanr(numbers, margins).statistic) if is_known else 0.0, one.text)
 
 
 def document(findings: Findings) -> dict[str, Any]:
@@ -191,35 +174,7 @@ def lines(findings: Findings) -> Iterator[str]:
     """The findings as text."""
     yield ""
     if findings.nominal and findings.nominal.outcome != "passed":
-        yield printable(f"at the nominal values: {findings.nominal.outcome}, {findings.nominal.reason}")
-    yield from _rate(findings)
-    if findings.influences:
-        yield "what matters (rank correlation of value and margin):"
-        width = max(len(one.name) for one in findings.influences)
-        for one in findings.influences:
-            yield printable(f"  {one.name:<{width}}  {one.correlation:+.2f}  {one.values}")
-    if findings.worst:
-        margin = findings.worst.margin or 0.0
-        yield f"worst margin {margin:.3f}: {_values(findings.worst)}"
-        yield printable(f"  {findings.worst.outcome}: {findings.worst.reason}")
-    for failure in findings.failures:
-        yield printable(f"failed {failure.drives} x: {failure.kind}")
-        yield f"  at worst: {_values(failure.worst)} (drive {failure.worst.number})"
-    for shrunk in findings.shrunk:
-        yield from _shrunk(shrunk)
-
-
-def _shrunk(shrunk: Shrunk) -> Iterator[str]:
-    away = ", ".join(f"{name} {shrunk.values[name]}" for name in shrunk.changed)
-    yield printable(f"the simplest failure of its kind: {away or 'all values nominal'}")
-    yield printable(f"  {shrunk.reason}")
-    if shrunk.spec:
-        yield f"  as a test: {shrunk.spec}"
-    else:
-        yield f"  only {shrunk.failed} of {shrunk.repeats} drives failed so: no test is written"
-
-
-def _rate(findings: Findings) -> Iterator[str]:
+        yield f"at the nominal values: {findings.nominal.outcome}, {findings.nominal.reason}"
     if findings.rate is None:
         yield "no drive was judged"
     else:
@@ -230,12 +185,22 @@ def _rate(findings: Findings) -> Iterator[str]:
     if findings.ended_early:
         yield "a failure ended the search, so this rate says little"
     if findings.proposed:
-        share = f"{findings.proposed_failed} of {findings.proposed}"
-        yield f"{share} further drives failed, where failures were expected: they do not count in this rate"
-    if findings.errors:
-        yield f"{findings.errors} left out, which ended in error twice, or failed once and not again:"
-        yield from (printable(f"  {group.drives} x: {group.kind}") for group in findings.left_out)
+        yield f"{findings.proposed_failed} of {findings.proposed} further drives failed at the ends of ranges"
+    yield from (f"error {group.drives} x: {group.kind}" for group in findings.left_out)
+    for one in findings.influences:
+        yield f"{one.name}: rank correlation with the margin {one.correlation:+.2f}"
+    if findings.worst:
+        yield f"worst margin {findings.worst.margin or 0.0:.3f}: {_values(findings.worst)}"
+    for failure in findings.failures:
+        yield f"failed {failure.drives} x: {failure.kind}"
+        yield f"  at worst: {_values(failure.worst)} (drive {failure.worst.number})"
+    for shrunk in findings.shrunk:
+        away = ", ".join(f"{name} {shrunk.values[name]}" for name in shrunk.changed)
+        yield f"the simplest failure of its kind: {away or 'all values nominal'}"
+        yield f"  {shrunk.reason}"
+        few = f"only {shrunk.failed} of {shrunk.repeats} drives failed so: no test is written"
+        yield f"  as a test: {shrunk.spec}" if shrunk.spec else f"  {few}"
 
 
 def _values(drive: Drive) -> str:
-    return printable(", ".join(f"{name} {text}" for name, text in drive.values.items()))
+    return ", ".join(f"{name} {text}" for name, text in drive.values.items())

@@ -52,9 +52,9 @@ class Shrinker:
 
     async def shrink(self, failures: Sequence[SearchFailure], failed: Sequence[tuple[Values, Drive]]) -> None:
         """Shrinks the first failures of ``failed`` drives, however long it takes. Raises Interrupted."""
-        self.drives.folder, self.drives.deadline = self.report / FOLDER, None
+        self.drives.folder = self.report / FOLDER
         for failure in failures[:MOST_KINDS]:
-            self.drives.progress.note(f"reducing: {failure.worst.reason} (--sweep leaves it out)")
+            self.drives.progress.note(f"reducing: {failure.worst.reason}")
             await self._shrink([one for one in failed if kind_of(one[1].reason) == failure.kind])
         shutil.rmtree(self.report / FOLDER, ignore_errors=True)
 

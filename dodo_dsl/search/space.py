@@ -104,13 +104,13 @@ class Candidate:
     swept: bool
 
 
-def course(space: Space, number: int, seed: int, corners: bool = True) -> Iterator[Candidate]:
+def course(space: Space, number: int, seed: int) -> Iterator[Candidate]:
     """The first drives of a search: by turns one of the sweep, and one at an end of each range of numbers.
 
     They depend on nothing but the seed, so that any number of workers drives them in any order.
     """
     swept = sweep(space, number, seed)
-    at_ends = itertools.islice(_corners(space, seed), _CORNERS) if corners else iter(())
+    at_ends = itertools.islice(_corners(space, seed), _CORNERS)
     for turn in range(number):
         corner = next(at_ends, None) if turn % 2 else None
         yield Candidate(corner or next(swept), corner is None)

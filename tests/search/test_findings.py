@@ -38,8 +38,7 @@ def test_findings() -> None:
     assert (found.low, found.high) == interval(3, 5)
     influences = {one.name: one.correlation for one in found.influences}
     assert influences["x"] == pytest.approx(-1.0)
-    assert influences["m"] == pytest.approx(((2 * 0 + (5 - 3) ** 2 + (4 - 3) ** 2 + 3 * 1) / 10) ** 0.5)
-    assert influences["n"] == 0.0
+    assert influences.keys() == {"x", "n"} and influences["n"] == 0.0
     assert found.worst == drives[5]
     assert [(failure.kind, failure.drives, failure.worst.number) for failure in found.failures] == [
         ("hit wall after # s", 2, 4),

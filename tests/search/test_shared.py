@@ -61,5 +61,5 @@ def test_a_search_of_two_workers_loses_nothing_when_one_is_killed(tmp_path: Path
         assert result("second") == result("alone")
         both = [*driven("first"), *driven("second")]
         assert set(both) == set(driven("alone"))
-        assert worker("third", "", "--storage", place, "--finish").wait(120) == 1
+        assert worker("third", "", "--storage", place).wait(120) == 1
         assert result("third") == result("alone") and not Path("third.txt").exists()
