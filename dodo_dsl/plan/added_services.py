@@ -144,7 +144,7 @@ _PARAMETER = re.compile(r"\{([a-z0-9.-]+)\}")
 def recorder(test: ResolvedTest, manifest: Manifest, image: str, cid: int) -> PlannedService:
     """The recorder's service, as ``record`` of the spec has it. A test on a rig has a snapshot of its first camera."""
     spec = test.spec
-    flags = [Flag("rec", RECORDING, "report"), Flag("commands", "false")]  # the application could stop it
+    flags = [Flag("rec", RECORDING, "report")]
     flags += [Flag("limit", f"{spec.record_limit_mb:g}")] if spec.record_limit_mb else []
     wanted = list(_pictures(test))
     wanted += [Flag("snapshot", SNAPSHOT, "report")] if spec.level == "hil" or spec.kind == "perception" else []

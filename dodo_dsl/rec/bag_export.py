@@ -9,6 +9,7 @@ import numpy as np
 
 from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.frame_decoder import FrameDecoder, packet_of
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError
 from dodo_dsl.opendlv.recording import Recording
@@ -18,7 +19,6 @@ from dodo_dsl.opendlv.ros_types import COMPRESSED, DETECTIONS, CameraView, Topic
 from dodo_dsl.opendlv.ros_types import IMAGE as IMAGE_TYPE
 from dodo_dsl.opendlv.video import CODECS, VideoError
 from dodo_dsl.rec.bag import WRITTEN, Key
-from dodo_dsl.rec.frames import FrameDecoder, packet_of
 
 
 @dataclass

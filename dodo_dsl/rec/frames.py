@@ -3,16 +3,14 @@
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 from dodo_dsl.opendlv.address import IMAGE
-from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.frame_decoder import FrameDecoder, Packet, packet_of
 from dodo_dsl.opendlv.message_columns import Numbers
-from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.opendlv.video import DecodedFrame, VideoDecoder, VideoError, refuse_large
+from dodo_dsl.opendlv.video import DecodedFrame, VideoError
 
-MOST_DECODERS = 16
+MOST_REASONS = 16
 _JPEG_QUALITY = 95
 
 
@@ -20,17 +18,6 @@ class FramesError(ValueError):
     """Missing or ambiguous frames; one sentence."""
 
     usage = True
-
-
-class Packet(NamedTuple):
-    """A recorded frame; ``sample_time`` is in microseconds since the epoch, width and height are the message's."""
-
-    sender_stamp: int
-    sample_time: int
-    format: str
-    data: bytes
-    width: int = 0
-    height: int = 0
 
 
 def images_of(recording: Recording, rows: Numbers, camera: int | None) -> Numbers:
@@ -49,45 +36,6 @@ def images_of(recording: Recording, rows: Numbers, camera: int | None) -> Number
     return images if camera is None else images[senders == camera]
 
 
-def packet_of(envelope: Envelope) -> Packet:
-    """The packet of an image message; one that cannot be read has an empty format."""
-    stamp, time = envelope.sender_stamp, envelope.sample_time
-    try:
-        image = MessageSet.standard().decode(IMAGE, envelope.payload)  # set 0.9 has the same numbers under other names
-    except MessageError:
-        return Packet(stamp, time, "", b"")
-    return Packet(stamp, time, image.format, image.data, image.width, image.height)
-
-
-class FrameDecoder:
-    """Decodes packets, those of each camera and format in their order.
-
-    At most 16 pairs of these are decoded, because each takes the memory of some frames.
-    """
-
-    def __init__(self) -> None:
-        self._decoders: dict[tuple[int, str], VideoDecoder] = {}
-
-    def decode(self, packet: Packet) -> DecodedFrame | None:
-        """The frame, None of a packet without one; raises VideoError for what is never decoded."""
-        if not packet.format:
-            return None
-        refuse_large(packet.width, packet.height)
-        key = packet.sender_stamp, packet.format
-        if key not in self._decoders:
-            if len(self._decoders) == MOST_DECODERS:
-                raise VideoError(f"frames of more than {MOST_DECODERS} cameras and formats are not decoded")
-            self._decoders[key] = VideoDecoder(packet.format)
-        return self._decoders[key].decode(packet.data)
-
-    def early(self) -> Iterator[str]:
-        """Sentences on packets before the first key frames."""
-        for (sender, _), decoder in self._decoders.items():
-            if early := decoder.early:
-                come = "packet of camera {} comes" if early == 1 else "packets of camera {} come"
-                yield f"{early} {come.format(sender)} before the first key frame, and so cannot be decoded"
-
-
 def decoded(
     recording: Recording, rows: Numbers, problem: Callable[[str], None]
 ) -> Iterator[tuple[Packet, DecodedFrame | None]]:
@@ -98,12 +46,13 @@ def decoded(
         try:
             frame = decoder.decode(packet)
         except VideoError as error:
-            if str(error) not in reasons and len(reasons) < MOST_DECODERS:
+            if str(error) not in reasons and len(reasons) < MOST_REASONS:
                 reasons.add(str(error))
                 problem(str(error))
         yield packet, frame
-    for text in decoder.early():
-        problem(text)
+    if early := decoder.early:
+        come = "packet comes" if early == 1 else "packets come"
+        problem(f"{early} {come} before the first key frame, and so cannot be decoded")
 
 
 def frames(

@@ -1,4 +1,4 @@
-"""A recording that is written: frames in order, up to a size, while recording is on; of pictures, the newest ones.
+"""A recording that is written: frames in order; of pictures, the newest ones.
 
 What a test may send has limits: a flood ends the recording, and the error says which messages it is made of.
 """
@@ -78,8 +78,6 @@ class Traffic:
         raise FloodError(f"{what}, most of it {message}/{stamp}")
 
 
-RECORD, STOP = 1, 2
-
 _log = logging.getLogger(__name__)
 
 
@@ -97,32 +95,16 @@ def _new(path: Path) -> RecordingWriter:
 
 
 class RecordingFile:
-    """A new `.rec` file. Once it has `max_size` bytes it takes no more messages, and logs that.
+    """A new `.rec` file, of which ``traffic`` counts what it takes.
 
-    ``traffic`` counts what it takes. Nothing is buffered in the process: whatever ends it, the file holds all frames
-    written so far.
+    Nothing is buffered in the process: whatever ends it, the file holds all frames written so far.
     Raises RecordingFileError for a file that exists, and if none can be made.
     """
 
-    def __init__(self, path: Path, max_size: int | None = None, traffic: Traffic | None = None) -> None:
-        self.is_on = True
+    def __init__(self, path: Path, traffic: Traffic | None = None) -> None:
         self._traffic = traffic
-        self.left_out = 0
-        self._max_size = max_size
+        self._is_flooded = False
         self._writer = _new(path)
-
-    @property
-    def frames(self) -> int:
-        """How many frames were written."""
-        return self._writer.frames
-
-    def command(self, command: int) -> None:
-        """RecorderCommand: 1 records from the next message on, 2 stops; others are logged and ignored."""
-        if command not in (RECORD, STOP):
-            _log.warning("unknown recorder command %d, expected 1 to record or 2 to stop", command)
-            return
-        self.is_on = command == RECORD
-        _log.info("recording %s with %d messages", "resumed" if self.is_on else "stopped", self.frames)
 
     def write(self, envelope: Envelope) -> None:
         """Append an envelope as it was received.
@@ -130,41 +112,26 @@ class RecordingFile:
         Raises RecordingFileError when the disk takes no more, and FloodError at the limits of ``traffic``, upon which
         recording ends.
         """
-        if not self.is_on:
+        if self._is_flooded:
             return
         try:
             frame = encode_frame(envelope)
         except FrameError as error:  # larger than a frame can be
-            self._leave_out(str(error))
+            _log.warning("a message was not recorded: %s", error)
             return
-        if self._max_size is not None and self._writer.size + len(frame) > self._max_size:
-            self._leave_out(f"the recording has its largest size, {self._max_size} bytes")
-            return
-        self._count(envelope, len(frame))
+        if self._traffic is not None:
+            self._is_flooded = True
+            self._traffic.add(envelope, len(frame))
+            self._is_flooded = False
         try:
             self._writer.write_frames((frame,))
         except OSError as error:
-            place = f"{self._writer.path} ends after {self.frames} messages"
+            place = f"{self._writer.path} ends after {self._writer.frames} messages"
             raise RecordingFileError(f"{place}: {error.strerror}") from None
 
     def close(self) -> None:
         """End the recording."""
-        if self.left_out:
-            _log.warning("%d messages were not recorded", self.left_out)
         self._writer.close()
-
-    def _count(self, envelope: Envelope, size: int) -> None:
-        try:
-            if self._traffic is not None:
-                self._traffic.add(envelope, size)
-        except FloodError:
-            self.is_on = False
-            raise
-
-    def _leave_out(self, reason: str) -> None:
-        if not self.left_out:
-            _log.warning("a message was not recorded: %s", reason)
-        self.left_out += 1
 
 
 _PIECE = 1 << 20

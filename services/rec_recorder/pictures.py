@@ -4,28 +4,19 @@ import logging
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import NamedTuple
 
 from dodo_dsl.opendlv import pixels
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.video import FORMAT, VideoEncoder, VideoError
+from services.base.pictures import png
 from services.rec_recorder.source import PictureSource, SourceError
 
 MESSAGE = "opendlv.proxy.ImageReading"
 
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Quality:
-    """How pictures are encoded, as VideoEncoder has it."""
-
-    key_interval: int
-    quality: int
-    lossless: bool
-    fast: bool = False
 
 
 class Taken(NamedTuple):
@@ -38,11 +29,14 @@ class Taken(NamedTuple):
 
 
 class RecordedCamera:
-    """One memory's pictures, encoded; `sender_stamp` distinguishes the memories of a recording."""
+    """One memory's pictures, encoded; `sender_stamp` distinguishes the memories of a recording.
 
-    def __init__(self, source: PictureSource, quality: Quality, sender_stamp: int) -> None:
-        self._source, self._quality = source, quality
-        self._messages, self._sender_stamp = MessageSet.standard(), sender_stamp
+    ``encoder`` makes a VideoEncoder of a format, width and height.
+    """
+
+    def __init__(self, source: PictureSource, encoder: Callable[[str, int, int], VideoEncoder], sender: int) -> None:
+        self._source, self._new_encoder = source, encoder
+        self._messages, self._sender_stamp = MessageSet.standard(), sender
         self._count = 0
         self._layout = ("", 0, 0)
         self._encoder: VideoEncoder | None = None
@@ -59,30 +53,19 @@ class RecordedCamera:
     def envelope(self, taken: Taken) -> Envelope:
         """The message of a picture, which follows the one before in the video; raises VideoError."""
         if self._encoder is None or taken.layout != self._layout:
-            quality = self._quality
-            self._encoder = VideoEncoder(
-                *taken.layout, quality.key_interval, quality.quality, quality.lossless, quality.fast
-            )
-            self._layout = taken.layout
-        payload = self._messages.encode(self._message(self._encoder.encode(taken.picture)))
+            self._encoder, self._layout = self._new_encoder(*taken.layout), taken.layout
+        _, width, height = self._layout
+        data, number = self._encoder.encode(taken.picture), self._count
+        fields = {"format": FORMAT, "width": width, "height": height, "data": data, "sampleId": number}
+        self._count += 1
+        payload = self._messages.encode(self._messages.type(MESSAGE)(**fields))
         return Envelope(
             self._messages.id(MESSAGE), payload, taken.sent, taken.sent, taken.sample_time, self._sender_stamp
         )
 
-    def restart(self) -> None:
-        """Begin with a key frame at the next picture, because those before are not in the recording."""
-        self._source.skip()
-        self._encoder = None
-
     def close(self) -> None:
         """Detach from the memory."""
         self._source.close()
-
-    def _message(self, packet: bytes) -> Any:
-        self._count += 1
-        _, width, height = self._layout
-        fields = {"format": FORMAT, "width": width, "height": height, "data": packet, "sampleId": self._count - 1}
-        return self._messages.type(MESSAGE)(**fields)
 
 
 Store = Callable[[RecordedCamera, Taken], None]
@@ -127,44 +110,59 @@ class Later:
 
 
 class Cameras:
-    """All memories that are recorded: each picture goes to `store` while `is_on`.
+    """All memories that are recorded: each picture goes to `store`.
 
     Where pictures are not ``required``, a camera whose pictures cannot be encoded is logged and left out.
     """
 
-    def __init__(
-        self,
-        cameras: Sequence[RecordedCamera],
-        store: Store,
-        is_on: Callable[[], bool],
-        required: bool = True,
-    ) -> None:
-        self._cameras, self._store, self._is_on, self._required = list(cameras), store, is_on, required
-        self._was_on = True
+    def __init__(self, cameras: Sequence[RecordedCamera], store: Store, required: bool = True) -> None:
+        self._cameras, self._store, self._required = list(cameras), store, required
 
     def update(self, now: int) -> None:
         """Take what is there at `now`, microseconds."""
-        if not self._is_on():
-            self._was_on = False
-            return
         for camera in tuple(self._cameras):
-            if not self._was_on:
-                camera.restart()
-            self._take(camera, now)
-        self._was_on = True
-
-    def _take(self, camera: RecordedCamera, now: int) -> None:
-        try:
-            if taken := camera.take(now):
-                self._store(camera, taken)
-        except (SourceError, VideoError) as error:
-            if self._required:
-                raise
-            _log.warning("no pictures are recorded: %s", error)
-            self._cameras.remove(camera)
-            camera.close()
+            try:
+                if taken := camera.take(now):
+                    self._store(camera, taken)
+            except (SourceError, VideoError) as error:
+                if self._required:
+                    raise
+                _log.warning("no pictures are recorded: %s", error)
+                self._cameras.remove(camera)
+                camera.close()
 
     def close(self) -> None:
         """Detach from all memories."""
         for camera in self._cameras:
             camera.close()
+
+
+class Snapshot:
+    """The first picture of ``source`` from a test's begin on, as a new PNG file; what fails is only logged."""
+
+    def __init__(self, source: PictureSource, path: Path) -> None:
+        self._source, self._path = source, path
+        self._has_begun = self._is_taken = False
+
+    def begin(self) -> None:
+        """The test begins: what was there before is not wanted."""
+        self._source.skip()
+        self._has_begun = True
+
+    def update(self, now: int) -> None:
+        """Take what is there at `now`, microseconds."""
+        taken = None if self._is_taken else self._source.take(now)
+        if taken is None or not self._has_begun:
+            return
+        self._is_taken = True
+        try:
+            layout = self._source.spec.layout(len(taken[0]))
+            picture = pixels.to_bgr(pixels.view(taken[0], *layout), layout[0])
+            with self._path.open("xb") as file:
+                file.write(png(picture))
+        except (ValueError, OSError) as error:
+            _log.warning("no snapshot was taken: %s", error)
+
+    def close(self) -> None:
+        """Detach from the memory."""
+        self._source.close()

@@ -1,18 +1,18 @@
 """The recorder on the bus."""
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dodo_dsl.opendlv.envelope import Envelope
 from services.base import Context, Service
 from services.base.lockstep_clock import RECORDING_END
 from services.base.service import period_of
-from services.rec_recorder.model import RecordingFile, Traffic
-from services.rec_recorder.source import MemorySpec, PictureSource, parse
+from services.rec_recorder.model import NewestPictures, RecordingFile, Traffic
+from services.rec_recorder.source import PictureSource, parse
 
 if TYPE_CHECKING:
-    from services.rec_recorder.pictures import Cameras, RecordedCamera
-    from services.rec_recorder.snapshot import SnapshotWriter
+    from services.rec_recorder.pictures import Cameras, Snapshot
 
 LOOKS_HZ, SNAPSHOT_LOOKS_HZ = 200.0, 20.0
 """Times a second at most that memories are looked at."""
@@ -22,7 +22,6 @@ WAITING = 32_000_000
 """Bytes of pictures that wait to be encoded: 69 of 640 x 480 pixels, which take a third of a second at the end."""
 GATHERS = 0.01
 """Seconds in which messages may gather, in real time: to wake for each one costs more than to record it."""
-COMMAND = "cluon.data.RecorderCommand"
 MEGABYTE = 1_000_000
 
 
@@ -33,21 +32,13 @@ class Recorder(Service):
     has_begun = False
 
     def __init__(
-        self,
-        recording: RecordingFile,
-        cameras: "Cameras | None",
-        snapshot: "SnapshotWriter | None",
-        commands: bool,
-        looks_hz: float = LOOKS_HZ,
+        self, recording: RecordingFile, cameras: "Cameras | None", snapshot: "Snapshot | None", looks_hz: float
     ) -> None:
         self.observe = recording.write
-        self._recording, self._cameras, self._snapshot = recording, cameras, snapshot
-        if cameras is not None:
+        self._snapshot = snapshot
+        self._cameras = [each for each in (cameras, snapshot) if each is not None]
+        if self._cameras:
             self.period = period_of(looks_hz)
-        elif snapshot is not None:
-            self.period = period_of(SNAPSHOT_LOOKS_HZ)
-        if commands:
-            self.inputs = {(COMMAND, None): self._command}
 
     def begin(self, now: int) -> None:
         self.has_begun = True
@@ -55,37 +46,36 @@ class Recorder(Service):
             self._snapshot.begin()
 
     def update(self, now: int) -> tuple[()]:
-        if self._cameras is not None:
-            self._cameras.update(now)
-        if self._snapshot is not None:
-            self._snapshot.update(now)
+        for each in self._cameras:
+            each.update(now)
         return ()
-
-    def _command(self, message: Any, _sample_time: int) -> None:
-        self._recording.command(message.command)
 
 
 def build(context: Context) -> Service:
     """The service from its flags; the recording is closed at the end. PyAV and OpenCV are loaded only for pictures."""
     flags = context.flags
-    memories = [parse(text) for text in flags["memories"]]
     for name in ("frames", "snapshot"):
-        if flags[name] and not memories:
+        if flags[name] and not flags["memories"]:
             raise ValueError(f"--{name} needs --memories: the names of the shared memories to record")
     if flags["pictures"] and not flags["frames"]:
         raise ValueError("--pictures needs --frames: the rate of the pictures")
-    max_size = flags["max-size"] and round(flags["max-size"] * MEGABYTE)
-    recording = RecordingFile(Path(flags["rec"]), max_size, _traffic(context))
+    memories = [parse(text) for text in flags["memories"]]
+    recording = RecordingFile(Path(flags["rec"]), _traffic(context))
     context.resources.callback(recording.close)
     if context.session is not None:
         context.session.gather(GATHERS)
-    if flags["paused"]:
-        recording.is_on = False
-    period, is_stepped = flags["frames"] and round(period_of(flags["frames"])), context.clock.relays
-    sources = [PictureSource(spec, period, is_stepped=is_stepped) for spec in memories if flags["frames"]]
-    cameras = _cameras(context, sources, recording) if sources else None
-    snapshot = _snapshot(context, Path(flags["snapshot"]), memories[0]) if flags["snapshot"] else None
-    recorder = Recorder(recording, cameras, snapshot, flags["commands"], _looks_hz(context))
+    cameras = snapshot = None
+    if flags["frames"]:
+        period = round(period_of(flags["frames"]))
+        sources = [PictureSource(memory, period, is_stepped=context.clock.relays) for memory in memories]
+        cameras = _cameras(context, sources, recording)
+        context.resources.callback(cameras.close)
+    if flags["snapshot"]:
+        from services.rec_recorder.pictures import Snapshot
+
+        snapshot = Snapshot(PictureSource(memories[0], 1), Path(flags["snapshot"]))
+        context.resources.callback(snapshot.close)
+    recorder = Recorder(recording, cameras, snapshot, _looks_hz(context))
     context.resources.callback(_end, recorder, recording, context)
     return recorder
 
@@ -104,7 +94,9 @@ def _traffic(context: Context) -> Traffic:
 def _looks_hz(context: Context) -> float:
     """How often memories are looked at; in lockstep a picture waits for the step that it belongs to."""
     rate: float = context.flags["frames"]
-    if not (rate and context.flags["pictures"]):
+    if not rate:
+        return SNAPSHOT_LOOKS_HZ
+    if not context.flags["pictures"]:
         return LOOKS_HZ
     return min(LOOKS_HZ, rate if context.clock.relays else max(FAST_LOOKS * rate, SNAPSHOT_LOOKS_HZ))
 
@@ -116,38 +108,24 @@ def _end(recorder: Recorder, recording: RecordingFile, context: Context) -> None
         recording.write(Envelope(context.messages.id(RECORDING_END), b"", now, 0, now, 0))
 
 
-def _snapshot(context: Context, path: Path, memory: MemorySpec) -> "SnapshotWriter":
-    from services.rec_recorder.snapshot import SnapshotWriter
-
-    snapshot = SnapshotWriter(PictureSource(memory, 1), path)
-    context.resources.callback(snapshot.close)
-    return snapshot
-
-
 def _cameras(context: Context, sources: list[PictureSource], recording: RecordingFile) -> "Cameras":
-    from services.rec_recorder.pictures import Cameras, Quality, RecordedCamera
+    """Pictures in the recording, or in one of their own, of which the newest stay."""
+    from dodo_dsl.opendlv.video import VideoEncoder
+    from services.rec_recorder.pictures import Cameras, Later, RecordedCamera
 
     flags = context.flags
-    is_alone = bool(flags["pictures"])
-    quality = Quality(flags["key-interval"], flags["quality"], flags["lossless"], fast=is_alone)
-    each = [RecordedCamera(source, quality, flags["id"] + number) for number, source in enumerate(sources)]
-    cameras = (
-        _pictures_alone(context, each, recording)
-        if is_alone
-        else Cameras(each, lambda camera, taken: recording.write(camera.envelope(taken)), lambda: recording.is_on)
+    encoder = partial(
+        VideoEncoder,
+        key_interval=flags["key-interval"],
+        quality=flags["quality"],
+        lossless=flags["lossless"],
+        fast=bool(flags["pictures"]),
     )
-    context.resources.callback(cameras.close)
-    return cameras
-
-
-def _pictures_alone(context: Context, cameras: "list[RecordedCamera]", recording: RecordingFile) -> "Cameras":
-    """Pictures in their own recording, of which the newest stay."""
-    from services.rec_recorder.model import NewestPictures
-    from services.rec_recorder.pictures import Cameras, Later
-
-    size = round(context.flags["pictures-size"] * MEGABYTE)
-    newest = NewestPictures(Path(context.flags["pictures"]), size)
+    cameras = [RecordedCamera(source, encoder, flags["id"] + number) for number, source in enumerate(sources)]
+    if not flags["pictures"]:
+        return Cameras(cameras, lambda camera, taken: recording.write(camera.envelope(taken)))
+    newest = NewestPictures(Path(flags["pictures"]), round(flags["pictures-size"] * MEGABYTE))
     context.resources.callback(newest.close)
     later = Later(newest.write, lambda: newest.is_wanted, WAITING)
     context.resources.callback(later.close)
-    return Cameras(cameras, later.add, lambda: recording.is_on and newest.is_on, required=False)
+    return Cameras(cameras, later.add, required=False)

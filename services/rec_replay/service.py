@@ -5,7 +5,6 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from google.protobuf.message import Message
@@ -20,14 +19,14 @@ from services.base import Context, Service
 from services.base.loop import TEST_BEGIN
 from services.base.pictures import memories
 from services.base.service import Framed, Output, period_of
-from services.rec_replay.selection import Part, Player, Selection, SelectionError, select
+from services.rec_replay.selection import Part, Player, SelectionError, select
 from services.rec_replay.stream import EntryStream, PictureMemories, first_frame
 
 LOOKS_HZ = 1000.0
 LARGEST_FRAME = 65_480
 MOST_TOGETHER = 256
 STATUS_PERIOD = MICROSECONDS
-COMMAND, STATUS, NOT_SHOWN = "cluon.data.PlayerCommand", "cluon.data.PlayerStatus", "dodo.NotShown"
+STATUS, NOT_SHOWN = "cluon.data.PlayerStatus", "dodo.NotShown"
 _PLAYING = 2
 
 _log = logging.getLogger(__name__)
@@ -51,11 +50,10 @@ class Replay(Service):
         settle: int,
         expect: Callable[[int], None],
     ) -> None:
-        self.inputs = {(COMMAND, None): self._command}
         self._player, self._stream, self._memories = player, stream, memories
         self._status, self._not_shown = messages.type(STATUS), messages.type(NOT_SHOWN)
         self._shifts, self._settle = shifts, settle
-        self._too_large = self._lost = 0
+        self._too_large = self._lost = self._round = 0
         self._reported = -STATUS_PERIOD
         self._end: int | None = None
         self._pictures = np.flatnonzero(stream.shown if stream.shown.any() else np.ones_like(stream.shown))
@@ -63,14 +61,14 @@ class Replay(Service):
         self._expect = expect
 
     def begin(self, now: int) -> None:
-        self._player.play()
+        self._player.playing = True
 
     def update(self, now: int) -> Iterator[Output | list[Framed]]:
         player = self._player
         player.advance(now)
-        if player.jumped:
-            self._stream.seek(player.position)
-            player.jumped = False
+        if player.round != self._round:
+            self._stream.rewind()
+            self._round = player.round
         together: list[Framed] = []
         while (taken := player.take()) is not None:
             entry, due = taken
@@ -91,14 +89,15 @@ class Replay(Service):
         yield together
         if not player.ended:
             self._stream.prepare()
-            self._end = None
         elif self._end is None:
             self._end = now + self._settle
-        self.finished = self._end is not None and now >= self._end and not player.jumped
+        self.finished = self._end is not None and now >= self._end
         self._expect(self._next_picture(now))
         if now - self._reported >= STATUS_PERIOD:
             self._reported = now
-            status = self._status(state=_PLAYING, numberOfEntries=len(player), currentEntryForPlayback=player.position)
+            status = self._status(
+                state=_PLAYING, numberOfEntries=len(self._stream.times), currentEntryForPlayback=player.position
+            )
             yield Output(status, 0)
 
     def _next_picture(self, now: int) -> int:
@@ -122,9 +121,6 @@ class Replay(Service):
             _log.warning("%d messages were not sent: they are too large for the bus", self._too_large)
         if self._memories is not None:
             _log.info("%d pictures were shown", self._memories.shown)
-
-    def _command(self, message: Any, _sample_time: int) -> None:
-        self._player.command(message.command, message.seekTo)
 
     def _missed(self, entry: int, due: int, misfits: int) -> Message:
         """The message that a picture was not shown, and until when: evaluators expect no answer to it."""
@@ -152,9 +148,9 @@ def build(context: Context) -> Service:
     part = _part(context, recording)
     player, stream = Player(part.due, flags["autorewind"]), EntryStream(recording, part)
     if not flags["await-begin"]:
-        player.play()
+        player.playing = True
     if context.session is not None:  # what it sends itself would fill its buffer
-        context.session.hear_only(map(context.messages.id, (COMMAND, TEST_BEGIN)))
+        context.session.hear_only([context.messages.id(TEST_BEGIN)])
     settle = round(flags["settle"] * MICROSECONDS)
     memories = _memories(context, recording, part)
     service = Replay(
@@ -175,16 +171,17 @@ def _part(context: Context, recording: Recording) -> Part:
     flags = context.flags
     version = flags["message-set"] if flags["message-set"] != "auto" else message_versions.version_of(recording)
     own = (Path(path) for path in os.environ.get("DODO_ODVD", "").split(os.pathsep) if path)
-    selection = Selection(
+    part = select(
+        recording,
+        message_versions.load(version, *own),
+        round(flags["max-gap"] * MICROSECONDS),
         start=flags["start"],
         end=flags["end"],
+        timemod=flags["timemod"],
         messages=flags["messages"],
         without=flags["without"],
-        video_sender=flags["video-sender"] if flags["video"] else None,
-        send_video=flags["send-video"],
+        camera=flags["video-sender"] if flags["video"] else None,
     )
-    max_gap = round(flags["max-gap"] * MICROSECONDS)
-    part = select(recording, selection, message_versions.load(version, *own), max_gap, flags["timemod"])
     seconds = part.due[-1] / MICROSECONDS
     _log.info("playing %d messages and %d pictures in %.1f s", part.sent.sum(), part.shown.sum(), seconds)
     return part

@@ -86,7 +86,7 @@ def test_classes_have_their_numbers_in_every_set(record: Callable[..., Path], tm
 def test_frames_without_a_key_frame_are_told(record: Callable[..., Path], tmp_path: Path) -> None:
     path = record([*video(12)[2:], *cone(BEGIN + 700_000, 0, "yellow", 0.25)])
     answer = dodo_rec("export", path, "--coco", "-o", tmp_path / "set")
-    told = "dodo rec: 3 packets of camera 0 come before the first key frame, and so cannot be decoded\n"
+    told = "dodo rec: 3 packets come before the first key frame, and so cannot be decoded\n"
     assert (answer.code, answer.stderr) == (0, f"{told}dodo rec: 3 packets cannot be decoded\n")
 
 

@@ -63,7 +63,7 @@ ATTACKS = (
     BusAttack("end", STRAIGHT, "realtime", only("dodo.EndOfInput", "camera", "pose", "vehicle")),
     BusAttack("begin", STRAIGHT, "lockstep", RUNNER),
     BusAttack("begin", STRAIGHT, "realtime", RUNNER),
-    BusAttack("seek", REPLAY, "lockstep", nobody("cluon.data.PlayerCommand")),
+    BusAttack("seek", REPLAY, "lockstep", ""),
     BusAttack("nan-once", STRAIGHT, "lockstep", NAN),
     BusAttack("nan-once", STRAIGHT, "realtime", NAN),
     BusAttack("unrecorded", STRAIGHT, "lockstep", WALL),

@@ -8,7 +8,7 @@ import pytest
 
 from tests.rec.conftest import BEGIN, dodo_rec, message, pictures, video
 
-EARLY = "dodo rec: 1 packet of camera 0 comes before the first key frame, and so cannot be decoded\n"
+EARLY = "dodo rec: 1 packet comes before the first key frame, and so cannot be decoded\n"
 
 
 def test_a_picture_for_each_frame(record: Callable[..., Path], tmp_path: Path) -> None:

@@ -19,29 +19,6 @@ def envelope(number: int) -> Envelope:
     return Envelope(1090, bytes(100), number, number, number, 0)
 
 
-def test_it_stops_at_its_largest_size(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    path = tmp_path / "drive.rec"
-    with closing(RecordingFile(path, max_size=300)) as recording:
-        for number in range(5):
-            recording.write(envelope(number))
-    assert len(list(read_envelopes(path))) == 2
-    assert path.stat().st_size <= 300
-    assert [r.getMessage() for r in caplog.records] == [
-        "a message was not recorded: the recording has its largest size, 300 bytes",
-        "3 messages were not recorded",
-    ]
-
-
-def test_commands_stop_it_and_let_it_go_on(tmp_path: Path) -> None:
-    path = tmp_path / "drive.rec"
-    with closing(RecordingFile(path)) as recording:
-        for number, command in enumerate((1, 2, 7, 1, 1, 2)):
-            recording.write(envelope(number))
-            recording.command(command)
-        recording.write(envelope(9))
-    assert [e.sent for e in read_envelopes(path)] == [0, 1, 4, 5]
-
-
 def test_a_full_disk_ends_it_with_a_readable_file(tmp_path: Path) -> None:
     path = tmp_path / "drive.rec"
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -70,9 +70,6 @@ class Stage:
         message = MESSAGES.type(name)(**fields)
         envelope = Envelope(MESSAGES.id(name), MESSAGES.encode(message), 1, 1, sample_time, 0)
         self.recorder.observe(envelope)
-        for (wanted, _), handler in self.recorder.inputs.items():
-            if wanted == name:
-                handler(message, sample_time)
 
 
 @contextmanager
@@ -100,26 +97,6 @@ def test_lossless_pictures_are_decoded_bit_for_bit(tmp_path: Path, kind: str) ->
     for number, envelope in enumerate(envelopes):
         frame = decoder.decode(MESSAGES.decode(IMAGE, envelope.payload).data)
         assert frame is not None and np.array_equal(frame.pixels(kind), scene(number, kind))
-
-
-def test_commands_pause_pictures_and_messages(tmp_path: Path) -> None:
-    path, command = tmp_path / "drive.rec", "cluon.data.RecorderCommand"
-    with staged(path, "i420", "--paused") as stage:
-        stage.hear("opendlv.proxy.PedalPositionRequest")
-        stage.show(7)
-        stage.hear(command, command=1)
-        stage.update()
-        stage.show(0)
-        stage.hear(command, command=2)
-        stage.update()
-        stage.show(1)
-        stage.hear(command, command=1)
-        stage.update()
-        stage.show(2)
-    envelopes = list(read_envelopes(path))
-    assert [e.data_type for e in envelopes] == [IMAGE, 11, IMAGE]
-    image = MESSAGES.decode(IMAGE, envelopes[2].payload)
-    assert b"\0\0\0\1\x67" in image.data  # it can be decoded without the picture that is missing
 
 
 def test_pictures_alone_are_in_a_recording_of_their_own(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -8,7 +9,7 @@ from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.recording_writer import RecordingWriter
-from services.rec_replay.selection import Selection, SelectionError, select
+from services.rec_replay.selection import SelectionError, select
 
 S = 1_000_000
 T0 = 1_600_000_000 * S
@@ -35,8 +36,8 @@ def recording(tmp_path: Path) -> Iterator[Recording]:
         yield recording
 
 
-def chosen(recording: Recording, selection: Selection, timemod: float = 1.0) -> list[tuple[int, float, str]]:
-    part = select(recording, selection, MessageSet.standard(), S, timemod)
+def chosen(recording: Recording, selection: dict[str, Any], timemod: float = 1.0) -> list[tuple[int, float, str]]:
+    part = select(recording, MessageSet.standard(), S, timemod=timemod, **selection)
     how = [
         f"{'sent ' * sent}{'shown' * shown}".strip()
         for sent, shown in zip(part.sent.tolist(), part.shown.tolist(), strict=True)
@@ -45,7 +46,7 @@ def chosen(recording: Recording, selection: Selection, timemod: float = 1.0) -> 
 
 
 def test_all_in_the_order_of_sample_times_with_gaps_cut(recording: Recording) -> None:
-    assert chosen(recording, Selection()) == [
+    assert chosen(recording, {}) == [
         (1, 0.0, "sent"),
         (0, 0.5, "sent"),
         (2, 1.0, "shown"),
@@ -55,42 +56,41 @@ def test_all_in_the_order_of_sample_times_with_gaps_cut(recording: Recording) ->
 
 
 def test_faster(recording: Recording) -> None:
-    assert [due for _, due, _ in chosen(recording, Selection(), 10.0)] == [0.0, 0.05, 0.1, 0.2, 0.3]
+    assert [due for _, due, _ in chosen(recording, {}, 10.0)] == [0.0, 0.05, 0.1, 0.2, 0.3]
 
 
 @pytest.mark.parametrize(
     ("selection", "rows"),
     [
-        (Selection(messages=["opendlv.proxy.GroundSteeringRequest"]), [0, 2, 5]),
-        (Selection(messages=["opendlv.proxy.GroundSteeringRequest/2", "4711"], video_sender=None), [6, 5]),
-        (Selection(without=["opendlv.proxy.GroundSteeringRequest/0", "1086"]), [2, 6, 5]),
-        (Selection(video_sender=1), [1, 0, 3, 6, 5]),
-        (Selection(video_sender=None, send_video=True), [1, 0, 2, 3, 6, 5]),
-        (Selection(start=0.4, end=1.05), [0, 2]),
-        (Selection(start=1.5), [6, 5]),
+        ({"messages": ["opendlv.proxy.GroundSteeringRequest"]}, [0, 2, 5]),
+        ({"messages": ["opendlv.proxy.GroundSteeringRequest/2", "4711"], "camera": None}, [6, 5]),
+        ({"without": ["opendlv.proxy.GroundSteeringRequest/0", "1086"]}, [2, 6, 5]),
+        ({"camera": 1}, [1, 0, 3, 6, 5]),
+        ({"start": 0.4, "end": 1.05}, [0, 2]),
+        ({"start": 1.5}, [6, 5]),
     ],
 )
-def test_parts(recording: Recording, selection: Selection, rows: list[int]) -> None:
+def test_parts(recording: Recording, selection: dict[str, Any], rows: list[int]) -> None:
     assert [row for row, _, _ in chosen(recording, selection)] == rows
 
 
 def test_filters_do_not_change_the_times(recording: Recording) -> None:
-    some = chosen(recording, Selection(messages=["4711", "opendlv.proxy.GroundSteeringRequest/2"], video_sender=None))
+    some = chosen(recording, {"messages": ["4711", "opendlv.proxy.GroundSteeringRequest/2"], "camera": None})
     assert [due for _, due, _ in some] == [2.0, 3.0]
 
 
 @pytest.mark.parametrize(
     ("selection", "problem"),
     [
-        (Selection(start=60), "has no message in the selected part"),
-        (Selection(messages=["1090/x"]), "'1090/x' is not a message: expected a sender stamp, a number"),
+        ({"start": 60}, "has no message in the selected part"),
+        ({"messages": ["1090/x"]}, "'1090/x' is not a message: expected a sender stamp, a number"),
         (
-            Selection(without=["opendlv.GroundSteeringRequest"]),
+            {"without": ["opendlv.GroundSteeringRequest"]},
             r"'opendlv.proxy.GroundSteeringRequest'\? \(or give an id\)$",
         ),
     ],
 )
-def test_wrong_parts(recording: Recording, selection: Selection, problem: str) -> None:
+def test_wrong_parts(recording: Recording, selection: dict[str, Any], problem: str) -> None:
     with pytest.raises(SelectionError, match=problem):
         chosen(recording, selection)
 
@@ -111,4 +111,4 @@ def test_a_recording_whose_times_cannot_be_right_is_not_played(
     for row, time in damage.items():
         recording.index["time"][row] = time
     with pytest.raises(SelectionError, match=re.escape(f"cannot be played: {said}")):
-        chosen(recording, Selection())
+        chosen(recording, {})

@@ -16,7 +16,7 @@ from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.video import VideoEncoder
 from services.base import Output
 from services.rec_replay.service import Replay
-from tests.services.built import built, hand, refusal
+from tests.services.built import built, refusal
 from tests.services.process import PATIENCE, running, send
 from tests.services.rec_replay.recordings import HEIGHT, IMAGE, T0, WIDTH, S, images, message, picture, write
 from tests.services.rec_replay.viewer import Viewer
@@ -94,25 +94,6 @@ def test_sample_times_of_the_test(tmp_path: Path) -> None:
         stage.run(9)
     assert [e.sample_time - BEGIN for _, e in stage.heard] == [0, S // 10, 3 * S // 10]
     assert all(e.sent == e.sample_time for _, e in stage.heard)
-
-
-def test_commands(tmp_path: Path) -> None:
-    command = "cluon.data.PlayerCommand"
-    with staged(write(tmp_path / "drive.rec", pedals([n * 0.5 for n in range(8)])), "--timemod=5") as stage:
-        for _ in range(2):
-            hand(stage.service, command, command=4)
-        stage.run(0.5)
-        assert stage.positions == [0, 1]
-        hand(stage.service, command, command=3, seekTo=0.75)
-        hand(stage.service, command, command=4)
-        stage.run(1)
-        assert stage.positions == [0, 1, 6]
-        status = stage.status[-1]
-        assert (status.state, status.numberOfEntries, status.currentEntryForPlayback) == (2, 8, 7)
-        hand(stage.service, command, command=3, seekTo=0.5)
-        hand(stage.service, command, command=1)
-        stage.run(2)
-    assert stage.positions[3:] == [4, 5, 6, 7] and stage.service.finished
 
 
 def test_it_repeats(tmp_path: Path) -> None:
