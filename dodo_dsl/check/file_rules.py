@@ -193,6 +193,8 @@ def check_input(context: RuleContext) -> Iterator[Diagnostic]:
     spec, services = context.spec, context.services
     unsure: Severity = "error" if spec.clock == "lockstep" else "warning"
     player = next((s for s in services if "rec" in s.texts and s.use.layer == "environment"), None)
+    others = (s for s in services if s is not player and s.use.layer == "environment")
+    is_blind = player and without_pictures(player) and not any(s.manifest.memory.outputs for s in others)
     known = wiring.rates(services)
     has_rate = not player and known.keys() & wiring.cameras_of(context.wiring)
     period = 1 / wiring.step_hz(context.wiring, known) if has_rate else 0.0
@@ -204,6 +206,9 @@ def check_input(context: RuleContext) -> Iterator[Diagnostic]:
                 why = f"judges {argument.text} s of the test's {spec.timeout_s:g} s, as nothing ends the input"
                 found.append((name, why, f"write '{name}: ...', how long it is to judge", "warning"))
         if service.use.layer == "evaluation":
+            if is_blind and "min-frames" in service.texts and not service.texts.get("freq"):
+                why = "judges answers to frames, and the recording that is played has none"
+                found.append(("min-frames", why, "play a recording with frames", "error"))
             found += [*_times(service, player, unsure), *_frames(service, player, period, unsure)]
         for name, why, hint, severity in found:
             entry = service.use.parameters.get(name)

@@ -1,7 +1,6 @@
 """dodo judge: judge the recording of a test again, also by other limits."""
 
 import argparse
-import shutil
 import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,15 +9,13 @@ from typing import Any, TextIO
 
 from dodo_dsl.cli import display, selection
 from dodo_dsl.cli.errors import Exit, UsageError, files_of_the_user
-from dodo_dsl.cli.run_jobs import compile_tests, load_compiled
+from dodo_dsl.cli.run_jobs import compile_tests
 from dodo_dsl.diagnostics import Piece
 from dodo_dsl.outcome import Outcome, Result
-from dodo_dsl.plan.added_services import RECORDING
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report import checks, results
-from dodo_dsl.report.report_folder import Drawable, draw_test, write_summaries
-from dodo_dsl.run.judge import LOGS, Judgement, judge
-from dodo_dsl.run.outcomes import Finding, outcome_of
+from dodo_dsl.run.judge import Judgement, judge
+from dodo_dsl.run.outcomes import Finding
 from dodo_dsl.run.protocol import VerdictEvent
 from dodo_dsl.run.test_recording import TestRecording, inspect
 from dodo_dsl.spec.load import Settings
@@ -38,20 +35,15 @@ def known_run(recording: Path) -> Outcome | None:
 VERSION = 1
 
 
-def as_text(plan: Plan, recording: TestRecording, judgement: Judgement, run: Outcome | None) -> str:
-    """The verdict as ``dodo run`` prints it, with all checks, and how it differs from the run's."""
-    return "".join(text for text, _ in as_pieces(plan, recording, judgement, run))
-
-
-def as_pieces(plan: Plan, recording: TestRecording, judgement: Judgement, run: Outcome | None) -> Iterator[Piece]:
-    """The same text in parts, for colours."""
+def as_pieces(plan: Plan, recording: TestRecording, judgement: Judgement) -> Iterator[Piece]:
+    """The verdict as ``dodo run`` prints it, with all checks, in parts for colours."""
     finding = judgement.finding
     clock = "lockstep" if recording.clock == "lockstep" else "real time"
     yield f"{recording.path}: {recording.duration_s:.1f} s in {clock}\n", ""
     yield f"{finding.result.upper():<7}", display.OF_OUTCOMES[finding.result]
     lines = [
         f" {plan.name}  {printable(finding.reason)}",
-        *(f"        note: {printable(note)}" for note in _notes(plan, judgement, run)),
+        *(f"        note: {printable(note)}" for note in judgement.notes),
         *(f"        | {printable(line)}" for line in judgement.last_lines),
     ]
     for verdict in judgement.verdicts:
@@ -60,7 +52,7 @@ def as_pieces(plan: Plan, recording: TestRecording, judgement: Judgement, run: O
     yield "\n".join(lines) + "\n", ""
 
 
-def as_json(plan: Plan, recording: TestRecording, judgement: Judgement, run: Outcome | None) -> str:
+def as_json(plan: Plan, recording: TestRecording, judgement: Judgement) -> str:
     """The same as one object, its checks as in ``results.json``."""
     finding = judgement.finding
     document: dict[str, Any] = {
@@ -76,25 +68,10 @@ def as_json(plan: Plan, recording: TestRecording, judgement: Judgement, run: Out
         "reason": finding.reason,
         "checks": [check for verdict in judgement.verdicts for check in verdict.checks],
         "verdicts": [verdict.as_json() for verdict in judgement.verdicts],
-        "notes": _notes(plan, judgement, run),
+        "notes": judgement.notes,
         "last_lines": judgement.last_lines,
     }
     return json_text(document)
-
-
-def _notes(plan: Plan, judgement: Judgement, run: Outcome | None) -> list[str]:
-    return [*_comparison(plan, judgement, run), *judgement.notes]
-
-
-def _comparison(plan: Plan, judgement: Judgement, run: Outcome | None) -> Iterator[str]:
-    """Whether the recording is of another test, and whether the run said something else."""
-    if run is None:
-        return
-    finding = judgement.finding
-    if run.slug != plan.slug:
-        yield f"the recording is of another test, {run.name}"
-    elif (run.outcome, run.reason) != (finding.result, finding.reason):
-        yield f"the run said {run.outcome}: {run.reason}"
 
 
 def _checks(verdict: VerdictEvent) -> Iterator[str]:
@@ -118,8 +95,7 @@ EXAMPLES = """examples:
   dodo judge dodo-report/sil-closed-straight/test.rec --spec sil-closed-straight
   dodo judge test.rec --spec my-limits/my-limits.dodo.yml      by the limits of another spec
   dodo judge test.rec --spec 'sil-perception[light=1,clutter=0]'
-  dodo judge dodo-report/sil-open-straight/test.rec --compiled generated/sil-open-straight --json
-  dodo judge test.rec --spec my-limits/my-limits.dodo.yml --report judged      and a page that replays it
+  dodo judge dodo-report/sil-open-straight/test.rec --spec sil-open-straight --json
 
 Every run leaves the recording of each test in its report. The evaluators of the spec get its messages in test time: in
 lockstep the verdict is the same, bit for bit; in real time it can differ where single updates decide.
@@ -132,15 +108,10 @@ _EXITS: dict[Result, Exit] = {"passed": Exit.OK, "failed": Exit.PROBLEMS, "error
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE.rec", help="recording of a test, test.rec in its report")
-    source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument("--spec", metavar="SPEC", help="name, instance or spec of the test by which it is judged")
-    source.add_argument(
-        "--compiled", type=Path, metavar="DIR/SLUG", help="folder of a compiled test, instead of a spec"
+    parser.add_argument(
+        "--spec", metavar="SPEC", required=True, help="name, instance or spec of the test by which it is judged"
     )
     parser.add_argument("--json", action="store_true", help="print the judgement as JSON")
-    parser.add_argument(
-        "--report", type=Path, metavar="DIR", help="new folder for a report, whose page replays the drive as judged now"
-    )
     selection.add_application(parser)
 
 
@@ -148,75 +119,39 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     with files_of_the_user():
         recording = inspect(options.file)
     run = known_run(options.file)
-    if options.report and options.report.exists():
-        raise UsageError(f"--report: '{options.report}' is there already, expected a new folder")
     with tempfile.TemporaryDirectory(prefix="dodo-judge-") as name:
         work = Path(name).resolve()
         plan, folder = _plan(options, run, work / "compiled", stderr if options.json else stdout)
         if recording.fault:
             judgement = Judgement(Finding("error", f"the recording cannot be judged: {recording.fault}"), ())
-            return _told(options, plan, recording, judgement, run, stdout)
-        (work / "files").mkdir()
-        cid = run.cid if run and run.slug == plan.slug else plan.cid
-        judgement = judge(plan, folder, recording, cid, work / "files")
-        if options.report:
-            with files_of_the_user():
-                problems = _write_report(options.report, Drawable(plan, folder), recording, judgement, cid)
-            stderr.writelines(f"{printable(problem)}\n" for problem in problems)
-    return _told(options, plan, recording, judgement, run, stdout)
-
-
-def _write_report(folder: Path, test: Drawable, recording: TestRecording, judgement: Judgement, cid: int) -> list[str]:
-    """The report of a judgement, with sentences on what could not be drawn; raises OSError."""
-    place = folder / test.plan.slug
-    place.mkdir(parents=True)
-    shutil.copyfile(recording.path, place / RECORDING)
-    if judgement.logs:
-        shutil.copytree(judgement.logs, place / LOGS)
-    outcome = replace(
-        outcome_of(test.plan, judgement.finding, "process", cid),
-        clock=recording.clock,
-        checks=tuple(check for verdict in judgement.verdicts for check in verdict.checks),
-        verdicts=tuple(verdict.as_json() for verdict in judgement.verdicts),
-        notes=judgement.notes,
-        last_lines=judgement.last_lines,
-    )
-    problems = draw_test(folder, outcome, test)
-    write_summaries(folder, [outcome])
-    return problems
+        else:
+            (work / "files").mkdir()
+            cid = run.cid if run and run.slug == plan.slug else plan.cid
+            judgement = judge(plan, folder, recording, cid, work / "files")
+    if run and run.slug != plan.slug:
+        judgement = replace(judgement, notes=(f"the recording is of another test, {run.name}", *judgement.notes))
+    return _told(options, plan, recording, judgement, stdout)
 
 
 def _told(
-    options: argparse.Namespace,
-    plan: Plan,
-    recording: TestRecording,
-    judgement: Judgement,
-    run: Outcome | None,
-    stdout: TextIO,
+    options: argparse.Namespace, plan: Plan, recording: TestRecording, judgement: Judgement, stdout: TextIO
 ) -> int:
     if options.json:
-        stdout.write(as_json(plan, recording, judgement, run))
+        stdout.write(as_json(plan, recording, judgement))
     else:
-        display.write_coloured(stdout, as_pieces(plan, recording, judgement, run))
+        display.write_coloured(stdout, as_pieces(plan, recording, judgement))
     return _EXITS[judgement.finding.result]
 
 
 def _plan(options: argparse.Namespace, run: Outcome | None, out: Path, notes: TextIO) -> tuple[Plan, Path]:
-    """The Plan by which to judge, and the folder of the compiled test; raises UsageError."""
-    if options.compiled:
-        if options.application:
-            raise UsageError("--compiled judges by a test as it was compiled: --application does not apply")
-        return load_compiled(options.compiled, Settings()), options.compiled.resolve()
+    """The Plan by which to judge, and the folder of the compiled test; raises UsageError.
+
+    Of several tests it is the one that the recording is of.
+    """
     words = argparse.Namespace(test=[options.spec], level=[], application=options.application, backend=None)
     plans, _, _ = compile_tests(words, Settings(), out, notes)
-    plan = _only(plans, run, options.spec)
-    return plan, out / plan.slug
-
-
-def _only(plans: list[Plan], run: Outcome | None, word: str) -> Plan:
-    """The test itself, or of several the one that the recording is of."""
-    same = [plan for plan in plans if len(plans) == 1 or (run is not None and plan.slug == run.slug)]
-    if same:
-        return same[0]
+    for plan in plans:
+        if len(plans) == 1 or (run is not None and plan.slug == run.slug):
+            return plan, out / plan.slug
     names = "', '".join(plan.name for plan in plans[:3])
-    raise UsageError(f"'{word}' means {len(plans)} tests, expected one, such as '{names}'")
+    raise UsageError(f"'{options.spec}' means {len(plans)} tests, expected one, such as '{names}'")

@@ -16,30 +16,23 @@ from dodo_dsl import __version__
 from dodo_dsl.report.results import COMMIT, Repository, RunRecord
 from dodo_dsl.spec.deployment import Deployment
 
-_VALUES = ("level", "backend", "jobs", "clock", "wall_timeout", "isolation", "seed", "compiled", "application")
-"""Options with values that may be noted; whatever is not listed here is left out."""
+_OPTIONS: Mapping[str, object] = {
+    **dict.fromkeys(("level", "backend", "jobs", "clock", "wall_timeout", "isolation", "seed", "compiled")),
+    **{"application": None, "repeat": 1, "samples": 0, "retry_errors": 0, "fail_fast": False},
+}
+"""Options that may be noted, with what they are by default; whatever is not listed here is left out."""
 
 
 def command_line(options: argparse.Namespace) -> str:
     """The command that repeats a run of these options; how it is shown, watched and reported is left out."""
-    return shlex.join(["dodo", "run", *options.test, *_flags(options)])
-
-
-def _flags(options: argparse.Namespace) -> Iterator[str]:
-    for name in _VALUES:
+    words = ["dodo", "run", *options.test]
+    for name, default in _OPTIONS.items():
         given = getattr(options, name)
-        values = given if isinstance(given, list) else [] if given is None else [given]
-        for value in values:
-            yield f"--{name.replace('_', '-')}"
-            yield f"{value:g}" if isinstance(value, float) else str(value)
-    if options.repeat != 1:
-        yield from ("--repeat", str(options.repeat))
-    if options.samples:
-        yield from ("--samples", str(options.samples))
-    if options.retry_errors:
-        yield from ("--retry-errors", str(options.retry_errors))
-    if options.fail_fast:
-        yield "--fail-fast"
+        for value in given if isinstance(given, list) else [given]:
+            if value not in (default, None):
+                words.append(f"--{name.replace('_', '-')}")
+                words += [] if value is True else [f"{value:g}" if isinstance(value, float) else str(value)]
+    return shlex.join(words)
 
 
 _PATIENCE_S = 5.0

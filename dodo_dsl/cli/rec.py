@@ -1,12 +1,11 @@
 """dodo rec: inspect, cut, export and import recordings."""
 
 import argparse
-import math
 from pathlib import Path
 from typing import TextIO
 
+from dodo_dsl.cli import numbers
 from dodo_dsl.cli.errors import Exit, files_of_the_user
-from dodo_dsl.opendlv.numbers import is_whole, number, whole
 
 EXAMPLES = """examples:
   dodo rec info drive.rec                                         messages, rates, gaps, frames, damage
@@ -14,19 +13,12 @@ EXAMPLES = """examples:
   dodo rec cut drive.rec -o front.rec --message opendlv.proxy.DistanceReading/0
   dodo rec export drive.rec --csv -o tables                       the same as cluon-rec2csv
   dodo rec export drive.rec --coco -o labelled                    frames and detections as a data set
-  dodo rec export drive.rec --video -o drive.mp4                  what the camera saw
+  dodo rec export old.rec --csv -o tables --messages 0.9 --messages own.odvd
+  dodo rec export drive.rec --frames -o pictures --pictures jpg   what the camera saw
+  dodo rec export drive.rec --video -o drive.mp4 --camera 0       the same as a video
   dodo rec export drive.rec --mcap -o drive.mcap                  for Foxglove, Lichtblick or rerun
   dodo rec export drive.rec --ros -o bag                          a bag of ROS 2, for RViz and others
   dodo rec import recorded -o drive-1.rec                         a recording of a bag, by the types of its topics
-"""
-_EXPORT = """examples:
-  dodo rec export drive.rec --csv -o tables
-  dodo rec export drive.rec --frames -o pictures --pictures jpg
-  dodo rec export drive.rec --video -o drive.mp4 --camera 0
-  dodo rec export drive.rec --mcap -o drive.mcap
-  dodo rec export drive.rec --ros -o bag
-  dodo rec export old.rec --csv -o tables --messages 0.9 --messages own.odvd
-  dodo rec export drive.rec --coco -o labelled --labels 3 --pictures jpg
 """
 _FORMATS = {
     "csv": "write one table per message and sender stamp",
@@ -45,7 +37,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     info.add_argument("--no-decode", action="store_true", help="count camera frames without decoding them")
     cut = _action(actions, "cut", "copy a part of a recording into a new one, byte for byte")
     cut.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="new recording")
-    export = _action(actions, "export", "export a recording for other tools", _EXPORT)
+    export = _action(actions, "export", "export a recording for other tools")
     what = export.add_mutually_exclusive_group(required=True)
     for name, text in _FORMATS.items():
         what.add_argument(f"--{name}", dest="format", action="store_const", const=name, help=text)
@@ -59,9 +51,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     export.add_argument(
         "--pictures", choices=("png", "jpg"), default="png", help="file type for --coco and --frames (default: png)"
     )
-    export.add_argument("--camera", metavar="N", type=_stamp, help="sender stamp of the camera, if there are several")
     export.add_argument(
-        "--labels", metavar="N", type=_stamp, help="sender stamp of the detections for --coco (default: all)"
+        "--camera", metavar="N", type=numbers.seed, help="sender stamp of the camera, if there are several"
+    )
+    export.add_argument(
+        "--labels", metavar="N", type=numbers.seed, help="sender stamp of the detections for --coco (default: all)"
     )
     for action in (cut, export):
         _selection(action)
@@ -77,11 +71,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def _action(
-    actions: "argparse._SubParsersAction[argparse.ArgumentParser]", name: str, text: str, examples: str | None = None
+    actions: "argparse._SubParsersAction[argparse.ArgumentParser]", name: str, text: str
 ) -> argparse.ArgumentParser:
-    action = actions.add_parser(
-        name, help=text, description=text, epilog=examples, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    action = actions.add_parser(name, help=text, description=text)
     if name == "import":
         action.add_argument("file", metavar="BAG", type=Path, help="folder of rosbag2, or its .mcap or .db3")
         return action
@@ -98,7 +90,10 @@ def _action(
 
 def _selection(action: argparse.ArgumentParser) -> None:
     action.add_argument(
-        "--start", metavar="S", type=_seconds, help="start time, in seconds since the recording's start or since 1970"
+        "--start",
+        metavar="S",
+        type=_seconds,
+        help="start time, in seconds since the recording's start or since 1970",
     )
     action.add_argument("--end", metavar="S", type=_seconds, help="end time (exclusive), as --start")
     action.add_argument(
@@ -111,20 +106,8 @@ def _selection(action: argparse.ArgumentParser) -> None:
     action.add_argument("--force", action="store_true", help="replace existing files")
 
 
-def _stamp(text: str) -> int:
-    if not is_whole(text):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a sender stamp, expected a whole number")
-    return whole(text)
-
-
 def _seconds(text: str) -> float:
-    try:
-        value = number(text.removesuffix("s"))
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value) or value < 0:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a time in seconds, expected for example 2.5")
-    return value
+    return numbers.patience(text.removesuffix("s"))
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:

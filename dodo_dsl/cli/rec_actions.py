@@ -13,7 +13,6 @@ from typing import TextIO
 from dodo_dsl import atomic
 from dodo_dsl.atomic import refuse_existing
 from dodo_dsl.cli.display import progress_bar
-from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.opendlv import message_versions
 from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.message_columns import Numbers
@@ -22,7 +21,7 @@ from dodo_dsl.opendlv.odvd import OdvdError
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec import contents, recording_filter
 from dodo_dsl.rec.contents import contents_text
-from dodo_dsl.rec.recording_filter import Excerpt, NothingSelected
+from dodo_dsl.rec.recording_filter import NothingSelected, rows_of
 from dodo_dsl.spec.deployment import find_deployment, load_deployment
 from dodo_dsl.terminal import json_text, printable
 
@@ -52,7 +51,7 @@ class RecJob:
         if self.recording.damage:
             self.tell(f"{self.recording.path}: {self.recording.damage}")
         options = self.options
-        return Excerpt(options.message, options.start, options.end).rows(self.recording, self.messages)
+        return rows_of(self.recording, self.messages, options.message, options.start, options.end)
 
     def folder(self) -> Path:
         """The output folder; raises NothingSelected for what is none."""
@@ -88,28 +87,17 @@ def messages_for(recording: Recording, wanted: Sequence[str], tell: Tell) -> tup
     files = [Path(word) for word in wanted if word not in chosen]
     version = chosen[-1] if chosen else message_versions.version_of(recording)
     messages = message_versions.load(version, *files)
-    deployment = find_deployment(Path.cwd())
-    if deployment is None:
-        return version, messages
-    try:
-        return version, message_versions.load(version, *_own(deployment, tell), *files)
-    except OdvdError as error:
-        tell(f"{error}; the messages of {deployment} are skipped")
-        return version, messages
-
-
-def _own(path: Path, tell: Tell) -> tuple[Path, ...]:
-    """The ODVD files that a ``dodo.yml`` names, as ``dodo run`` takes them; none if it would refuse the file."""
-    deployment, problems = load_deployment(path)
-    errors = [problem for problem in problems if problem.severity == "error"]
-    if errors:
-        tell(f"{_place(errors[0])}: {errors[0].message}; its messages are skipped")
-        return ()
-    return deployment.messages
-
-
-def _place(problem: Diagnostic) -> str:
-    return f"{problem.span.file}:{problem.span.line}:{problem.span.column}"
+    if path := find_deployment(Path.cwd()):
+        deployment, problems = load_deployment(path)
+        places = [(each.span, each.message) for each in problems if each.severity == "error"]
+        errors = [f"{span.file}:{span.line}:{span.column}: {message}" for span, message in places]
+        try:
+            if not errors:
+                return version, message_versions.load(version, *deployment.messages, *files)
+        except OdvdError as error:
+            errors = [str(error)]
+        tell(f"{errors[0]}; the messages of {path} are skipped")
+    return version, messages
 
 
 def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:

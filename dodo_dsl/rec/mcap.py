@@ -8,7 +8,7 @@ Reference: docs.foxglove.dev, "Message schemas"; mcap.dev, "MCAP File Format", a
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -36,17 +36,6 @@ Convert = Callable[[Any, int, int], tuple[str, Message] | None]
 WORLD = "world"
 _VIDEO = {"h264": "h264", "H264": "h264", "VP90": "vp9"}
 _IMAGE = {"mjpg": "jpeg", "MJPG": "jpeg"}
-
-
-def converter(layout: Layout) -> Convert | None:
-    """What makes a message of Foxglove of those of a layout; None if there is none."""
-    for version, converters in _CONVERTERS.items():
-        convert = converters.get(layout.definition.name)
-        if convert and message_versions.load(version).layout(layout.definition.name).definition.same_layout(
-            layout.definition
-        ):
-            return convert
-    return None
 
 
 def _picture(message: Any, stamp: int, time: int) -> tuple[str, Message] | None:
@@ -84,14 +73,14 @@ def _timestamp(time: int) -> Timestamp:
     return Timestamp(seconds=seconds, nanos=microseconds * 1000)
 
 
-_CONVERTERS: Mapping[str, Mapping[str, Convert]] = {
-    message_versions.NEW: {"opendlv.proxy.ImageReading": _picture, "opendlv.sim.Frame": _pose},
-    message_versions.OLD: {"opendlv.proxy.ImageReading": _picture, "opendlv.sim.Frame": _pose_of_angles},
-}
-
-
-_NANOSECONDS = 1000
-_PROTOBUF = "protobuf"
+def converter(layout: Layout) -> Convert | None:
+    """What makes a message of Foxglove of those of a layout; None if there is none."""
+    name = layout.definition.name
+    for version, pose in ((message_versions.NEW, _pose), (message_versions.OLD, _pose_of_angles)):
+        convert = {"opendlv.proxy.ImageReading": _picture, "opendlv.sim.Frame": pose}.get(name)
+        if convert and message_versions.load(version).layout(name).definition.same_layout(layout.definition):
+            return convert
+    return None
 
 
 @dataclass
@@ -170,6 +159,6 @@ class _Channels:
             type_ = type(message)
             if type_ not in self._schemas:
                 self._schemas[type_] = register_schema(self._writer, type_)
-            self._channels[topic] = self._writer.register_channel(topic, _PROTOBUF, self._schemas[type_])
-        log_time, publish_time = (max(each, 0) * _NANOSECONDS for each in (time, sent))
+            self._channels[topic] = self._writer.register_channel(topic, "protobuf", self._schemas[type_])
+        log_time, publish_time = (max(each, 0) * 1000 for each in (time, sent))
         self._writer.add_message(self._channels[topic], log_time, payload, publish_time)

@@ -1,7 +1,6 @@
 """The part of a recording that a command works on, some messages and a time range, and its copy byte for byte."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,36 +19,25 @@ class NothingSelected(Exception):
     usage = True
 
 
-@dataclass(frozen=True)
-class Excerpt:
-    """``messages`` are names or ids, each with ``/senderStamp`` for a single sender; none means all.
+def rows_of(
+    recording: Recording, known: MessageSet, messages: Sequence[str], start: float | None, end: float | None
+) -> Numbers:
+    """The rows in the order of the file; raises NothingSelected.
 
-    ``start`` and ``end`` are seconds since the recording's start, or since 1970.
+    ``messages`` are names or ids, each with ``/senderStamp`` for a single sender; none means all. ``start`` and ``end``
+    are seconds since the recording's start, or since 1970.
     """
-
-    messages: Sequence[str] = ()
-    start: float | None = None
-    end: float | None = None
-
-    def rows(self, recording: Recording, known: MessageSet) -> Numbers:
-        """The rows in the order of the file; raises NothingSelected."""
-        times = recording.index["time"]
-        begin = int(times[times != 0].min(initial=np.iinfo(np.int64).max))
-        rows = recording.rows(start=_microseconds(self.start, begin), end=_microseconds(self.end, begin))
-        if self.messages:
-            try:
-                rows = rows[matching(recording.index[rows], map(known.key, self.messages))]
-            except MessageError as error:
-                raise NothingSelected(str(error)) from None
-        if not len(rows):
-            raise NothingSelected(f"nothing selected: no message of {recording.path} matches {self}")
-        return rows
-
-    def __str__(self) -> str:
-        options = [f"--message {message}" for message in self.messages]
-        options += [f"--start {self.start:g}"] if self.start is not None else []
-        options += [f"--end {self.end:g}"] if self.end is not None else []
-        return " ".join(options)
+    times = recording.index["time"]
+    begin = int(times[times != 0].min(initial=np.iinfo(np.int64).max))
+    rows = recording.rows(start=_microseconds(start, begin), end=_microseconds(end, begin))
+    if messages:
+        try:
+            rows = rows[matching(recording.index[rows], map(known.key, messages))]
+        except MessageError as error:
+            raise NothingSelected(str(error)) from None
+    if not len(rows):
+        raise NothingSelected(f"nothing selected: no message of {recording.path} is within --start, --end, --message")
+    return rows
 
 
 def _microseconds(seconds: float | None, begin: int) -> int | None:

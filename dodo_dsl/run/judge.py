@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from dodo_dsl.log_times import JUDGED_SUFFIX
 from dodo_dsl.plan.model import Plan, PlannedService
 from dodo_dsl.run import service_protocol
 from dodo_dsl.run.outcomes import Facts, Finding, decide, how_it_ended
@@ -17,7 +16,6 @@ from dodo_dsl.run.protocol import Malformed, Noted, VerdictEvent
 from dodo_dsl.run.test_recording import TestRecording
 
 NOT_OF_A_RECORDING = ("DODO_READERS", "DODO_RIG", "DODO_WORLD", "DODO_TOLD", "DODO_TRUTH")
-LOGS = "logs"
 _TAIL_LINES, _TAIL_WIDTH = 8, 300
 
 
@@ -29,8 +27,6 @@ class Judgement:
     verdicts: tuple[VerdictEvent, ...]
     notes: tuple[str, ...] = ()
     last_lines: tuple[str, ...] = ()
-    logs: Path | None = None
-    """The folder of the evaluators' logs, and of what they recorded."""
 
 
 @dataclass
@@ -44,10 +40,8 @@ class _Running:
 def judge(plan: Plan, folder: Path, recording: TestRecording, cid: int, work: Path) -> Judgement:
     """Let the evaluators of a Plan judge; ``folder`` is the compiled test's, ``work`` an empty one for their files.
 
-    ``cid`` is the one that verdicts name. What they recorded is in LOGS below ``work``. Raises OSError where a program
-    cannot be started.
+    ``cid`` is the one that verdicts name. Raises OSError where a program cannot be started.
     """
-    (work / LOGS).mkdir()
     commands = Commands(plan, folder, work, Slot(cid))
     facts = Facts(tuple(service.name for service in plan.services if service.judge))
     notes: list[str] = []
@@ -57,12 +51,12 @@ def judge(plan: Plan, folder: Path, recording: TestRecording, cid: int, work: Pa
         running = [stack.enter_context(_started(s, commands.of(s), recording, work)) for s in services]
         for one in running:
             code = one.process.wait()
-            tails[one.service.name] = _collect(one, facts, notes, work / LOGS)
+            tails[one.service.name] = _collect(one, facts, notes)
             _take_end(one.service.name, code, facts, recording)
     finding = decide(facts)
     verdicts = tuple(verdict for name in facts.evaluators for verdict in facts.verdicts.get(name, []))
     last_lines = tails.get(finding.service, ()) if finding.result != "passed" else ()
-    return Judgement(finding, verdicts, tuple(notes), last_lines, work / LOGS)
+    return Judgement(finding, verdicts, tuple(notes), last_lines)
 
 
 @contextmanager
@@ -85,14 +79,11 @@ def _started(service: PlannedService, command: Command, recording: TestRecording
             process.wait()
 
 
-def _collect(one: _Running, facts: Facts, notes: list[str], logs: Path) -> tuple[str, ...]:
+def _collect(one: _Running, facts: Facts, notes: list[str]) -> tuple[str, ...]:
     """Take what an evaluator printed; returns the last lines of its log."""
     name = one.service.name
-    recorded = []
     one.output.seek(0)
     for line in one.output:
-        if line.startswith(service_protocol.JUDGED):
-            recorded.append(line)
         match service_protocol.read(name, True, line):
             case VerdictEvent() as verdict:
                 facts.verdicts.setdefault(name, []).append(verdict)
@@ -102,11 +93,7 @@ def _collect(one: _Running, facts: Facts, notes: list[str], logs: Path) -> tuple
             case Noted(text):
                 notes.append(text)
     one.log.seek(0)
-    said = one.log.read()
-    log = logs / f"{one.service.layer}.{name}.log"
-    log.write_bytes(said)
-    log.with_suffix(JUDGED_SUFFIX).write_bytes(b"".join(recorded))
-    return _tail(said.splitlines())
+    return _tail(one.log.read().splitlines())
 
 
 def _tail(lines: Sequence[bytes]) -> tuple[str, ...]:

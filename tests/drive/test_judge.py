@@ -110,17 +110,6 @@ def test_the_example_passes_every_shipped_test(runs: Runs) -> None:
     assert runs.checks("sil-closed-two-cars")["time-to-goal"] > 8.5, "the other car is ahead until then"
 
 
-def test_what_was_judged_over_time_is_the_same_in_a_report_of_its_own(runs: Runs, tmp_path: Path) -> None:
-    recording, report = runs.recording(CONES), tmp_path / "again"
-    judged(0, recording, "--spec", CONES, "--report", report)
-    record = "logs/evaluation.cones.judged"
-    assert (report / CONES / record).read_bytes() == (recording.parent / record).read_bytes()
-    assert (report / CONES / "drive.html").is_file() and (report / "index.html").is_file()
-    said = io.StringIO()
-    assert main(["judge", str(recording), "--spec", CONES, "--report", str(report)], said, said) == 2
-    assert f"'{report}' is there already, expected a new folder" in said.getvalue()
-
-
 @pytest.mark.parametrize("slug", ALL)
 def test_judged_again_it_is_the_same_bit_for_bit(runs: Runs, slug: str) -> None:
     test = dict(runs.tests[slug])
@@ -135,7 +124,6 @@ def test_another_limit_gives_another_verdict(runs: Runs, tmp_path: Path) -> None
     spec = changed(tmp_path, STRAIGHT, "max-time", "3 s")
     again = judged(1, runs.recording(STRAIGHT), "--spec", spec)
     assert again["reason"].startswith("did not reach finish within 3.00 s: the vehicle is at x = ")
-    assert again["notes"] == [f"the run said passed: {runs.tests[STRAIGHT]['reason']}"]
     spec = changed(tmp_path, SIGNAL, "max-mean", "0.001")
     again = judged(1, runs.recording(SIGNAL), "--spec", spec)
     assert "the mean distance is " in again["reason"] and "(at most 0.001)" in again["reason"]

@@ -54,7 +54,7 @@ def test_without_a_repository_nothing_is_known_of_them(rec: Path, tmp_path: Path
 @pytest.mark.parametrize(
     ("deployment", "odvd", "said"),
     [
-        ("dodo: 1\nmessages: [none.odvd]\n", CONE, "dodo.yml:2:12: there is no file 'none.odvd'; its messages are"),
+        ("dodo: 1\nmessages: [none.odvd]\n", CONE, "dodo.yml:2:12: there is no file 'none.odvd'; the messages of "),
         ("dodo: 1\nmesages: [cone.odvd]\n", CONE, "dodo.yml:2:1: "),
         ("dodo: 1\nmessages: [cone.odvd]\n", "message team.Cone [", "cone.odvd:1:"),
     ],
@@ -66,7 +66,7 @@ def test_a_deployment_that_cannot_be_used_is_told_and_left_out(
     (tmp_path / "cone.odvd").write_text(odvd)
     found, stderr = names(rec, "--messages=../../gate.odvd")
     assert found == [None, "team.Gate"]
-    assert stderr.startswith(f"dodo rec: {tmp_path}/{said}") and stderr.endswith("messages are skipped\n")
+    assert stderr.startswith(f"dodo rec: {tmp_path}/{said}") and stderr.endswith("dodo.yml are skipped\n")
     assert len(stderr.splitlines()) == 1
 
 
