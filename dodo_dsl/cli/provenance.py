@@ -8,9 +8,10 @@ import shlex
 import subprocess
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import NamedTuple
 
 from dodo_dsl import __version__
 from dodo_dsl.report.results import COMMIT, Repository, RunRecord
@@ -72,12 +73,11 @@ def _git(folder: Path, *words: str) -> str:
     return done.stdout if done.returncode == 0 else ""
 
 
-@dataclass(frozen=True)
-class Origin:
-    """``folders`` are by what is in them."""
+class Origin(NamedTuple):
+    """What repeats a run, and the folders that it is of, by what is in them."""
 
     command: str
-    folders: Mapping[str, Path] = field(default_factory=dict)
+    folders: Mapping[str, Path]
 
 
 def origin(options: argparse.Namespace, deployment: Deployment) -> Origin:

@@ -99,10 +99,7 @@ def _test(runs: Sequence[Outcome]) -> TestScore:
 
 
 VERSION = 1
-METHOD = (
-    "score: mean over the tests, of each the mean over its runs, 0 for one that failed; "
-    "failed tests rank below everything"
-)
+METHOD = "score: mean over the tests, of each the mean over its runs; failed tests rank below everything"
 HEAD = ("rank", "team", "score", "failed", "no answer", "runs")
 
 
@@ -181,10 +178,8 @@ EXAMPLES = """examples:
   dodo rank old=one/dodo-report new=two/dodo-report
   dodo rank a=1/results.json a=2/results.json b=3/results.json     two runs of team 'a'
 
-Goals are under 'goals' in a test and never change a verdict; results.json has them. A passed run scores the weighted
-mean of its goals from 0 to 1 (1 without goals), a failed one 0. A team's score is the mean over all tests that any team
-ran, of each the mean over its runs. Teams are ordered by the share of runs that failed, then by score. A test
-without an answer, because it is missing or ended in error each time, counts as failed.
+A passed run scores the weighted mean of its goals from 0 to 1 (1 without goals), a failed one 0. Teams are ordered by
+the share of runs that failed, then by score. A test without an answer counts as failed.
 """
 
 

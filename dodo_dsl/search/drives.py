@@ -64,19 +64,18 @@ def end_like_interrupt() -> None:
 class SearchPoint:
     """A test at values of its ranges, none for one without ranges, with ``variables`` for its application.
 
-    ``name`` names its drive in the store; with ``repeat`` it is driven again at the same values.
+    ``name`` names its drive in the store.
     """
 
     spec: Spec
     values: Values
     name: Mapping[str, str]
     variables: Values = field(default_factory=dict)
-    repeat: int = 1
 
 
 def point_at(spec: Spec, values: Values, repeat: int = 1) -> SearchPoint:
     """The point of a search."""
-    return SearchPoint(spec, values, drive_name(values, repeat), repeat=repeat)
+    return SearchPoint(spec, values, drive_name(values, repeat))
 
 
 def drive_name(values: Values, repeat: int = 1) -> dict[str, str]:
@@ -88,7 +87,7 @@ def drive_name(values: Values, repeat: int = 1) -> dict[str, str]:
 class Drives:
     """Drives points in rounds, which are short where the store is ``shared`` with other workers.
 
-    ``work`` takes compiled tests, and ``folder`` what drives that did not pass say. ``known`` are all drives so far.
+    ``work`` takes compiled tests, and ``folder`` what drives that did not pass say.
     """
 
     checked: compiler.Checked
@@ -99,7 +98,6 @@ class Drives:
     progress: Progress
     folder: Path
     shared: bool = False
-    known: dict[str, Drive] = field(default_factory=dict)
 
     def run(self, work: Coroutine[Any, Any, None]) -> bool:
         """Does work that drives, and closes the backends. Whether an interrupt ended it early."""
@@ -119,8 +117,7 @@ class Drives:
         size = self._size(points)
         while True:
             drives = self.store.known([point.name for _, point in missing.values()])
-            self.known |= {name: drive for name, drive in zip(missing, drives, strict=True) if drive}
-            missing = {name: one for name, one in missing.items() if name not in self.known}
+            missing = {name: missing[name] for name, drive in zip([*missing], drives, strict=True) if not drive}
             if not missing:
                 return
             # workers that begin at different points hardly ever make the same drive
@@ -158,10 +155,8 @@ class Drives:
         checks = ",".join(failed_checks(outcome))
         drive = Drive(number, point.name, outcome.outcome, worst_margin(outcome), outcome.reason, checks)
         self.store.add(drive)
-        self.known[point_text(point.name)] = drive
         margin = "" if drive.margin is None else f", margin {drive.margin:.3f}"
-        failed = sum(one.outcome == "failed" for one in self.known.values())
-        self.progress.note(f"drive {number}: {drive.outcome}{margin}; {failed} of {len(self.known)} failed")
+        self.progress.note(f"drive {number}: {drive.outcome}{margin}")
 
     def _jobs(self, points: dict[int, SearchPoint], folder: Path) -> dict[int, Job]:
         tests = {number: self._test(number, point) for number, point in points.items()}

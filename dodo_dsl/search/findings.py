@@ -183,7 +183,7 @@ def lines(findings: Findings) -> Iterator[str]:
             f"{CONFIDENCE:.0%} interval {findings.low:.2%} to {findings.high:.2%}"
         )
     if findings.ended_early:
-        yield "a failure ended the search, so this rate says little"
+        yield "a failure ended the search"
     if findings.proposed:
         yield f"{findings.proposed_failed} of {findings.proposed} further drives failed at the ends of ranges"
     yield from (f"error {group.drives} x: {group.kind}" for group in findings.left_out)

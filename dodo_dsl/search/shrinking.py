@@ -32,8 +32,8 @@ _PARTS = 4
 _ROUNDS = 6
 """Rounds in each of which a way becomes a quarter: less than a thousandth is left."""
 _NOT_WORD = re.compile(r"[^a-z0-9]+")
-_MOST_NAME, _LEAST_OF_TEST = 60, 20
-"""Characters of a name, as the schema has it, and those of the test's that it keeps at least."""
+_MOST_NAME, _MOST_OF_TEST = 57, 40
+"""Characters of a name, of which the schema allows 60, before its number, and of those of the test's in it."""
 
 Fails = Callable[[list[Values]], Awaitable[list[bool]]]
 """Which of some values fail for the same reason."""
@@ -167,14 +167,10 @@ async def _nearer(space: Space, values: Values, one: Range, fails: Fails) -> Val
 
 def name_of(spec: Spec, changed: Sequence[str], taken: set[str]) -> str:
     """A name that is not ``taken``: the test's and the ranges whose values are not nominal."""
-    names = "-".join(word for name in changed for word in _NOT_WORD.split(name.lower()) if word)
-    for number in range(1, len(taken) + 2):
-        last = f"-{number}" if number > 1 else ""
-        end = f"-fails-at-{names or 'nominal'}"[: _MOST_NAME - _LEAST_OF_TEST - len(last)].rstrip("-") + last
-        name = spec.location.stem[: _MOST_NAME - len(end)].rstrip("-") + end
-        if name not in taken:
-            break
-    return name
+    words = "-".join(word for name in changed for word in _NOT_WORD.split(name.lower()) if word) or "nominal"
+    name = f"{spec.location.stem[:_MOST_OF_TEST].rstrip('-')}-fails-at-{words}"[:_MOST_NAME].rstrip("-")
+    numbered = (f"{name}-{number}" for number in range(2, len(taken) + 2))
+    return next(one for one in (name, *numbered) if one not in taken)
 
 
 def text_of(spec: Spec, name: str, values: Values, reason: str) -> str:

@@ -44,9 +44,8 @@ def search_study(checked: Checked, made: Compilation, work: Path, seed: int) -> 
     """The study of one test, within its ranges."""
     _refuse_containers(made, "a search")
     space = space_of(checked.tests[0])
-    told = [*_rendered(made), *_at_ends(checked, checked.specs[0], work)]
     ranges = [(one.name, one.text, one.nominal.text, one.is_list) for one in space.ranges]
-    return Study(checked, space, _digest([told, ranges, sorted(space.whole), seed]))
+    return Study(checked, space, _digest([_told(checked, made, work), ranges, sorted(space.whole), seed]))
 
 
 def refuse_search(word: str, tests: Sequence[ResolvedTest]) -> None:
@@ -71,11 +70,7 @@ def tune_study(checked: Checked, made: Compilation, work: Path, samples: int) ->
     space = Space(tunables(checked.application) if checked.application else ())
     _refuse_tuning(space, checked.specs, samples)
     _refuse_containers(made, "tuning")
-    told = [*_rendered(made), *sorted(_files(made))]
-    told += [
-        text for n, one in enumerate(checked.specs) if one.ranges for text in _at_ends(checked, one, work / str(n))
-    ]
-    return Study(checked, space, _digest(told))
+    return Study(checked, space, _digest(_told(checked, made, work)))
 
 
 def _refuse_tuning(space: Space, specs: Sequence[Spec], samples: int) -> None:
@@ -95,15 +90,15 @@ def _refuse_containers(made: Compilation, what: str) -> None:
         raise NotSearchable(f"{what} starts the application as processes: give each of its services 'x-dodo-process'")
 
 
-def _rendered(made: Compilation) -> list[str]:
-    return [file.text for plan in made.compiled.suite.plans for file in render_plan(plan)]
-
-
-def _at_ends(checked: Checked, spec: Spec, work: Path) -> list[str]:
-    """What the files of a test hold, as maps and recordings, also those at the ends of its ranges."""
-    nominal = vary.nominal(spec.ranges)
-    ends = {str(n): {**nominal, **corner} for n, corner in enumerate(vary.corners(spec.ranges))}
-    return _files(compiler.plan(compiler.at_values(checked, spec, ends), work / "ends"))
+def _told(checked: Checked, made: Compilation, work: Path) -> list[str]:
+    """The compiled tests, and what their files hold, as maps and recordings, also those at the ends of ranges."""
+    told = [file.text for plan in made.compiled.suite.plans for file in render_plan(plan)] + _files(made)
+    for number, spec in enumerate(checked.specs):
+        nominal = vary.nominal(spec.ranges)
+        ends = {str(n): {**nominal, **corner} for n, corner in enumerate(vary.corners(spec.ranges))}
+        if spec.ranges:
+            told += _files(compiler.plan(compiler.at_values(checked, spec, ends), work / str(number) / "ends"))
+    return told
 
 
 def _files(made: Compilation) -> list[str]:

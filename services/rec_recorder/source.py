@@ -45,11 +45,9 @@ class MemorySpec:
                     if not self.width:
                         _say_once("assuming that memory '%s' has %d x %d pixels of %s", self.name, width, height, kind)
                     return kind, width, height
-        common, given = (
-            f"common size: write {self.name}:WIDTHxHEIGHT",
-            f"picture of {self.width} x {self.height} pixels",
-        )
-        raise SourceError(f"memory '{self.name}' has {size} bytes, not those of a {given if self.width else common}")
+        given = f"picture of {self.width} x {self.height} pixels"
+        wanted = given if self.width else f"common size: write {self.name}:WIDTHxHEIGHT"
+        raise SourceError(f"memory '{self.name}' has {size} bytes, not those of a {wanted}")
 
 
 def parse(text: str) -> MemorySpec:

@@ -79,8 +79,8 @@ LONG = "sil-" + "-".join(["chicane"] * 7)
         ("sil-chicane", ["light", "Start_y"], set(), "sil-chicane-fails-at-light-start-y"),
         ("sil-chicane", [], set(), "sil-chicane-fails-at-nominal"),
         ("sil-chicane", ["a"], {"sil-chicane-fails-at-a"}, "sil-chicane-fails-at-a-2"),
-        (LONG, ["light"], set(), "sil-chicane-chicane-chicane-chicane-chicane-c-fails-at-light"),
-        (LONG, ["bend" * 20], set(), "sil-chicane-chicane-fails-at-bendbendbendbendbendbendbendbe"),
+        (LONG, ["light"], set(), "sil-chicane-chicane-chicane-chicane-chic-fails-at-light"),
+        (LONG, ["bend" * 20], set(), "sil-chicane-chicane-chicane-chicane-chic-fails-at-bendben"),
     ],
 )
 def test_a_test_is_named_after_what_was_shrunk(test: str, changed: list[str], taken: set[str], name: str) -> None:
