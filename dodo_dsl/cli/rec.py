@@ -13,6 +13,8 @@ EXAMPLES = """examples:
   dodo rec cut drive.rec -o front.rec --message opendlv.proxy.DistanceReading/0
   dodo rec export drive.rec --csv -o tables                       the same as cluon-rec2csv
   dodo rec export drive.rec --coco -o labelled                    frames and detections as a data set
+  dodo rec export desk.rec --coco -o labelled --truth desk.json   frames and the boxes of a truth file
+  dodo rec export drive.rec old.rec --coco -o set --validation 50%      one set of several recordings
   dodo rec export old.rec --csv -o tables --messages 0.9 --messages own.odvd
   dodo rec export drive.rec --frames -o pictures --pictures jpg   what the camera saw
   dodo rec export drive.rec --video -o drive.mp4 --camera 0       the same as a video
@@ -57,6 +59,14 @@ def add(parser: argparse.ArgumentParser) -> None:
     export.add_argument(
         "--labels", metavar="N", type=numbers.seed, help="sender stamp of the detections for --coco (default: all)"
     )
+    export.add_argument(
+        "--truth", metavar="FILE.json", type=Path, help="truth file with the boxes for --coco, the same for every frame"
+    )
+    export.add_argument(
+        "--validation", metavar="SHARE", type=_share, default=0.0,
+        help="with --coco: folders train and validation, the latter with this share of the recordings",
+    )  # fmt: skip
+    export.add_argument("--seed", metavar="N", type=numbers.seed, default=0, help="chooses those recordings")
     for action in (cut, export):
         _selection(action)
     text = "make a recording of a bag of ROS 2, by the types of its topics (needs DoDo's extra 'ros')"
@@ -77,7 +87,10 @@ def _action(
     if name == "import":
         action.add_argument("file", metavar="BAG", type=Path, help="folder of rosbag2, or its .mcap or .db3")
         return action
-    action.add_argument("file", metavar="FILE.rec", type=Path)
+    if name == "export":
+        action.add_argument("files", metavar="FILE.rec", type=Path, nargs="+", help="--coco takes several")
+    else:
+        action.add_argument("file", metavar="FILE.rec", type=Path)
     action.add_argument(
         "--messages",
         metavar="SET",
@@ -108,6 +121,16 @@ def _selection(action: argparse.ArgumentParser) -> None:
 
 def _seconds(text: str) -> float:
     return numbers.patience(text.removesuffix("s"))
+
+
+def _share(text: str) -> float:
+    try:
+        share = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        share = 0
+    if not 0 < share < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is no share, expected e.g. 20%")
+    return share
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:

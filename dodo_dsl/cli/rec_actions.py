@@ -55,14 +55,14 @@ class RecJob:
 
     def folder(self) -> Path:
         """The output folder; raises NothingSelected for what is none."""
-        folder: Path = self.options.output or self.options.file.with_suffix("")
+        folder: Path = self.options.output or self.recording.path.with_suffix("")
         if folder.exists() and not folder.is_dir():
             raise NothingSelected(f"'{folder}' is not a folder; name one with -o")
         return folder
 
     def file(self, suffix: str = "") -> Path:
         """The output file; raises NothingSelected for the recording itself, OutputExists for one that stays."""
-        output: Path = self.options.output or self.options.file.with_suffix(suffix)
+        output: Path = self.options.output or self.recording.path.with_suffix(suffix)
         if output.exists() and output.samefile(self.recording.path):
             raise NothingSelected(f"'{output}' is the recording itself; name another file with -o")
         refuse_existing([output], self.options.force)
@@ -107,20 +107,26 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
 
         rec_bag.import_bag(options, stdout, stderr)
         return
-    path: Path = options.file
+    if options.action == "export":
+        from dodo_dsl.cli import rec_export
+
+        rec_export.run(options, stdout, stderr)
+        return
+    with opened(options.file, options, stdout, stderr) as (job, version):
+        if options.action == "info":
+            _info(job, version)
+        else:
+            _cut(job)
+
+
+@contextmanager
+def opened(path: Path, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> Iterator[tuple[RecJob, str]]:
+    """A recording of the command line, and the version of its messages."""
     with progress_bar(stderr, f"reading {path.name}", path.stat().st_size) as progress:
         recording = Recording(path, progress)
     with recording:
         version, messages = messages_for(recording, options.messages, lambda text: tell(stderr, text))
-        job = RecJob(options, recording, messages, stdout, stderr)
-        if options.action == "info":
-            _info(job, version)
-        elif options.action == "cut":
-            _cut(job)
-        else:
-            from dodo_dsl.cli import rec_export
-
-            rec_export.EXPORTS[options.format](job)
+        yield RecJob(options, recording, messages, stdout, stderr), version
 
 
 def _info(job: RecJob, version: str) -> None:

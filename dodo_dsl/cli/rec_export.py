@@ -1,13 +1,17 @@
 """The exports of ``dodo rec export``, by the option that asks for one."""
 
-from collections.abc import Callable, Mapping
+import argparse
+import random
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
 from dodo_dsl import atomic
 from dodo_dsl.atomic import refuse_existing
 from dodo_dsl.cli.errors import require_extra
-from dodo_dsl.cli.rec_actions import RecJob
+from dodo_dsl.cli.rec_actions import RecJob, opened, tell
 from dodo_dsl.cli.rec_bag import export_bag
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.rec import coco, csv_table
@@ -58,16 +62,6 @@ def _images(job: RecJob) -> tuple[Numbers, Numbers]:
     return images_of(job.recording, rows, job.options.camera), rows
 
 
-def _coco(job: RecJob) -> None:
-    folder, options = job.folder(), job.options
-    images, rows = _images(job)
-    refuse_existing([folder / coco.ANNOTATIONS], options.force)
-    labels = coco.detections(job.recording, job.messages, rows, options.labels)
-    with atomic.files_into(folder) as place, job.progress("decoding frames", len(images)) as progress:
-        found = coco.write(job.recording, images, labels, place, options.pictures, progress, job.tell)
-    job.stdout.write(f"{folder}: {len(found.images)} frames with {len(found.boxes)} boxes\n")
-
-
 def _frames(job: RecJob) -> None:
     folder, options = job.folder(), job.options
     images, _ = _images(job)
@@ -102,9 +96,69 @@ def _mcap(job: RecJob) -> None:
 
 EXPORTS: Mapping[str, Callable[[RecJob], None]] = {
     "csv": _csv,
-    "coco": _coco,
     "frames": _frames,
     "video": _video,
     "mcap": _mcap,
     "ros": export_bag,
 }
+
+
+def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
+    """Carries out an export; raises OSError and what else ``cli.errors`` has a sentence for."""
+    if options.format == "coco":
+        _data_set(options, stdout, stderr)
+        return
+    if len(options.files) > 1:
+        raise NothingSelected(f"--{options.format} takes one recording")
+    with opened(options.files[0], options, stdout, stderr) as (job, _):
+        EXPORTS[options.format](job)
+
+
+def _data_set(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
+    """Frames and boxes of all recordings, some of which may be for validation; all of it or nothing."""
+    files: Sequence[Path] = options.files
+    if len(files) > 1 and options.output is None:
+        raise NothingSelected("name the folder of the data set with -o")
+    if options.truth and options.labels is not None:
+        raise NothingSelected("--truth and --labels exclude each other: boxes come from a file or from a sender")
+    folder: Path = options.output or files[0].with_suffix("")
+    if folder.exists() and not folder.is_dir():
+        raise NothingSelected(f"'{folder}' is not a folder; name one with -o")
+    parts = _parts(len(files), options.validation, options.seed)
+    refuse_existing([folder / part / coco.ANNOTATIONS for part in parts], options.force)
+    sets = {part: coco.DataSet() for part in parts}
+    with atomic.files_into(folder) as place:
+        for part, chosen in parts.items():
+            for number in chosen:
+                with opened(files[number], options, stdout, stderr) as (job, _):
+                    _add(job, sets[part], place / part, f"{number + 1:03}-" if len(files) > 1 else "")
+        classes = {name for each in sets.values() for _, (name, _) in each.boxes}
+        for part, each in sets.items():
+            if not each.images:
+                named = files[0] if len(files) == 1 else f"{len(parts[part])} recordings"
+                raise NothingSelected(f"no frame of {named} that can be decoded has a detection with a box in it")
+            each.finish(place / part, classes, lambda text: tell(stderr, text))
+    for part, each in sets.items():
+        of = f" of {len(parts[part])} recordings" if len(files) > 1 else ""
+        stdout.write(f"{folder / part}: {len(each.images)} frames with {len(each.boxes)} boxes{of}\n")
+
+
+def _parts(count: int, share: float, seed: int) -> dict[str, list[int]]:
+    """The numbers of the recordings by part: whole ones, as frames of one drive are alike."""
+    if not share:
+        return {"": list(range(count))}
+    if count < 2:
+        raise NothingSelected("--validation needs two recordings or more, as frames of one drive are alike")
+    wanted = min(max(round(share * count), 1), count - 1)
+    chosen = sorted(random.Random(seed).sample(range(count), wanted))  # noqa: S311  (repeatable, not secret)
+    return {"train": [n for n in range(count) if n not in chosen], "validation": chosen}
+
+
+def _add(job: RecJob, found: coco.DataSet, folder: Path, prefix: str) -> None:
+    images, rows = _images(job)
+    if job.options.truth:
+        labels = coco.of_truth(job.recording, images, job.options.truth)
+    else:
+        labels = coco.detections(job.recording, job.messages, rows, job.options.labels)
+    with job.progress(f"decoding {job.recording.path.name}", len(images)) as progress:
+        found.add(job.recording, images, labels, folder, prefix, job.options.pictures, progress, job.tell)

@@ -9,13 +9,15 @@ import json
 import math
 import zlib
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from dodo_dsl.opendlv.assets import truth_file
+from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.assets.truth_file import plain
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
@@ -42,9 +44,8 @@ class DataSet:
     cut: int = 0
     empty: int = 0
 
-    def text(self) -> str:
+    def text(self, classes: Collection[str]) -> str:
         """The content of annotations.json."""
-        names = {name for _, (name, _) in self.boxes}
         annotations = [
             {
                 "id": number,
@@ -56,7 +57,7 @@ class DataSet:
             }
             for number, (image, (name, box)) in enumerate(self.boxes, 1)
         ]
-        categories = [{"id": class_number(name), "name": name, "supercategory": ""} for name in sorted(names)]
+        categories = [{"id": class_number(name), "name": name, "supercategory": ""} for name in sorted(classes)]
         content = {"images": self.images, "annotations": annotations, "categories": categories}
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
@@ -72,6 +73,30 @@ class DataSet:
             self.cut += min(x, y) < -_SLACK or max(x + wide, y + high) > 1 + _SLACK
             found.append((name, (left, top, round(right - left, 3), round(low - top, 3))))
         return found
+
+    def add(
+        self, recording: Recording, images: Numbers, labels: Mapping[int, list[LabelledBox]], folder: Path,
+        prefix: str, picture_type: str, progress: Callable[[int], None], problem: Callable[[str], None],
+    ) -> None:  # fmt: skip
+        """Writes the frames with labels, whose names begin with ``prefix``; raises FramesError and OSError."""
+        names = frame_names(recording, images, picture_type)
+        (folder / "images").mkdir(parents=True, exist_ok=True)
+        for number, packet, frame in frames(recording, images, progress, problem):
+            if boxes := self.cut_boxes(labels.get(packet.sample_time, ()), frame.width, frame.height):
+                path, id_ = f"images/{prefix}{names[number]}", len(self.images) + 1
+                write_picture(folder / path, frame)
+                image = {"id": id_, "file_name": path, "width": frame.width, "height": frame.height}
+                image["sample_time"] = packet.sample_time
+                self.images.append(image | ({"recording": str(recording.path)} if prefix else {}))
+                self.boxes += [(id_, box) for box in boxes]
+
+    def finish(self, folder: Path, classes: Collection[str], problem: Callable[[str], None]) -> None:
+        """Writes annotations.json with all ``classes``; raises OSError."""
+        if self.cut:
+            problem(f"cut {self.cut} boxes at the edges of their frames")
+        if self.empty:
+            problem(f"left out {self.empty} boxes without an area in their frames")
+        (folder / ANNOTATIONS).write_text(self.text(classes), encoding="utf-8")
 
 
 def class_number(name: str) -> int:
@@ -108,25 +133,10 @@ def _class_of(detection: Mapping[str, Any]) -> str:
     return label or (f"type {detection[_TYPE].type}" if _TYPE in detection else "object")
 
 
-def write(
-    recording: Recording, images: Numbers, labels: Mapping[int, list[LabelledBox]], folder: Path, picture_type: str,
-    progress: Callable[[int], None], problem: Callable[[str], None],
-) -> DataSet:  # fmt: skip
-    """Writes the frames with labels, and annotations.json; raises FramesError for none, and OSError."""
-    result, names = DataSet(), frame_names(recording, images, picture_type)
-    (folder / "images").mkdir(parents=True)
-    for number, packet, frame in frames(recording, images, progress, problem):
-        if boxes := result.cut_boxes(labels.get(packet.sample_time, ()), frame.width, frame.height):
-            path, id_ = f"images/{names[number]}", len(result.images) + 1
-            write_picture(folder / path, frame)
-            size = {"width": frame.width, "height": frame.height}
-            result.images.append({"id": id_, "file_name": path, **size, "sample_time": packet.sample_time})
-            result.boxes += [(id_, box) for box in boxes]
-    if not result.images:
-        raise FramesError(f"no frame of {recording.path} that can be decoded has a detection with a box in it")
-    if result.cut:
-        problem(f"cut {result.cut} boxes at the edges of their frames")
-    if result.empty:
-        problem(f"left out {result.empty} boxes without an area in their frames")
-    (folder / ANNOTATIONS).write_text(result.text(), encoding="utf-8")
-    return result
+def of_truth(recording: Recording, images: Numbers, path: Path) -> Mapping[int, list[LabelledBox]]:
+    """The boxes of a truth file for each image message, as of a rig if nothing moves; raises FramesError."""
+    try:
+        (found,) = truth_file.read(path, "one").values()
+    except InputError as error:
+        raise FramesError(str(error)) from None
+    return dict.fromkeys((e.sample_time for e in recording.envelopes(images)), found)

@@ -119,3 +119,38 @@ def test_what_is_there_is_kept(drive: Path, tmp_path: Path) -> None:
     assert "annotations.json' exists already" in dodo_rec("export", drive, "--coco", "-o", tmp_path / "set").stderr
     assert (tmp_path / "set" / "annotations.json").read_text() == "{}"
     assert dodo_rec("export", drive, "--coco", "-o", tmp_path / "set", "--force").code == 0
+
+
+def test_sets_of_several_recordings_have_one_numbering(record: Callable[..., Path], tmp_path: Path) -> None:
+    """A drive on which only yellow cones were seen has the other classes, too."""
+    drives = [
+        record([*video(2), *cone(BEGIN, 0, "yellow", 0.25), *(cone(BEGIN, 1, "ball", 0.5) if n else [])], f"{n}.rec")
+        for n in range(4)
+    ]
+    words = ("--coco", "--validation", "50%", "--seed", "1")
+    assert dodo_rec("export", *drives, *words, "-o", tmp_path / "set").code == 0
+    sets = [json.loads((tmp_path / "set" / part / "annotations.json").read_text()) for part in ("train", "validation")]
+    assert sets[0]["categories"] == sets[1]["categories"] and len(sets[0]["categories"]) == 2
+    of = [{image["recording"] for image in each["images"]} for each in sets]
+    assert [len(each) for each in of] == [2, 2] and not of[0] & of[1]
+    for part, each in zip(("train", "validation"), sets, strict=True):
+        assert all((tmp_path / "set" / part / image["file_name"]).is_file() for image in each["images"])
+    alone = dodo_rec("export", drives[0], *words, "-o", tmp_path / "alone")
+    assert alone.code == 2 and "needs two recordings" in alone.stderr
+
+
+@pytest.mark.parametrize("change", [{}, {"image_id": 9}, {"iscrowd": 1}])
+def test_boxes_of_a_truth_file(change: dict[str, int], record: Callable[..., Path], tmp_path: Path) -> None:
+    truth = {
+        "images": [{"id": 7, "file_name": "a.png", "width": WIDTH, "height": HEIGHT}],
+        "annotations": [{"id": 1, "image_id": 7, "category_id": 3, "bbox": [8, 8, 16, 12], **change}],
+        "categories": [{"id": 3, "name": "ball"}],
+    }
+    (tmp_path / "truth.json").write_text(json.dumps(truth))
+    words = ("--coco", "-o", tmp_path / "set", "--truth", tmp_path / "truth.json")
+    answer = dodo_rec("export", record(video(2)), *words)
+    if change:
+        assert answer.code == 2 and "truth.json" in answer.stderr and not (tmp_path / "set").exists()
+    else:
+        found = json.loads((tmp_path / "set" / "annotations.json").read_text())
+        assert [each["bbox"] for each in found["annotations"]] == [[8, 8, 16, 12]] * 2

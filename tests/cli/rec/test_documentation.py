@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.cli import rec
-from tests.rec.conftest import BEGIN, dodo_rec, message, video
+from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, video
 
 PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "recordings.md").read_text()
 SHOWN = re.findall(r"^ +dodo rec (.*?)(?:  |$)", PAGE + rec.EXAMPLES, re.MULTILINE)
@@ -33,8 +33,17 @@ def test_the_lines_shown_run(
         message("opendlv.logic.perception.DetectionBoundingBox", BEGIN + 100_000, stamp, width=1, height=1)
         for stamp in (0, 3)
     ]
-    for name in ("drive.rec", "old.rec"):
+    for name in ("drive.rec", "old.rec", "desk.rec"):
         record([*video(4), *others, *box], name)
+    (tmp_path / "desk.json").write_text(
+        json.dumps(
+            {
+                "images": [{"id": 1, "file_name": "desk.png", "width": WIDTH, "height": HEIGHT}],
+                "annotations": [{"id": 1, "image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4]}],
+                "categories": [{"id": 1, "name": "yellow"}],
+            }
+        )
+    )
     if words.startswith("import"):
         assert dodo_rec("export", "drive.rec", "--ros", "-o", "recorded").code == 0
     code, stdout, stderr = dodo_rec(*shlex.split(words))
