@@ -1,6 +1,6 @@
-"""``dodo images builds``: the application's builds, checked, as a compose file for ``docker buildx bake``.
+"""``dodo images builds --push``: the application's images by ``docker buildx bake``, from checked builds.
 
-With ``--push`` it is built and pushed, without the variables of this process: no build sees a pipeline's token.
+No build sees the variables of this process, such as a pipeline's token.
 """
 
 import argparse
@@ -32,16 +32,16 @@ from dodo_dsl.spec.deployment import Deployment
 def add(parser: argparse.ArgumentParser) -> None:
     selection.add_application(parser)
     parser.add_argument(
-        "--push", metavar="P",
+        "--push", metavar="P", required=True,
         help="build and push each as P/SERVICE, from copies without tests, reports, compiled tests and .git; print "
         "lines DODO_IMAGE_<SERVICE>=IMAGE with digests"
     )  # fmt: skip
-    parser.add_argument("--tag", metavar="T", default="latest", help="with --push: tag of the images (default: latest)")
-    parser.add_argument("--platform", metavar="P,...", default="", help="with --push: platforms of the images")
+    parser.add_argument("--tag", metavar="T", default="latest", help="tag of the images (default: latest)")
+    parser.add_argument("--platform", metavar="P,...", default="", help="platforms of the images")
 
 
-def show(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    """Writes the application's checked builds as a compose file; raises UsageError if there is no application."""
+def push(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    """Builds and pushes the images, and writes a line for each; raises UsageError, DockerError."""
     deployment = selection.checked_deployment()
     files = selection.existing_files(options.application) or deployment.application
     if not files:
@@ -56,17 +56,13 @@ def show(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         builds = checked_builds(source)
     except EnvironmentProblem as error:
         raise UsageError(f"the application's builds: {error}") from error
-    if options.push:
-        with tempfile.TemporaryDirectory(prefix="dodo-builds-") as folder:
-            hidden = _hidden(source, deployment, files)
-            try:
-                services = own_contexts(builds["services"], hidden, Path(folder).resolve(), Path.cwd())
-            except (HiddenContext, OSError, shutil.Error) as error:
-                raise UsageError(f"--push: {error}") from error
-            for line in _push({**builds, "services": services}, options, Path(folder)):
-                stdout.write(f"{line}\n")
-        return Exit.OK
-    stdout.write(json.dumps(builds, indent=2) + "\n")
+    with tempfile.TemporaryDirectory(prefix="dodo-builds-") as folder:
+        hidden = _hidden(source, deployment, files)
+        try:
+            services = own_contexts(builds["services"], hidden, Path(folder).resolve(), Path.cwd())
+        except (HiddenContext, OSError, shutil.Error) as error:
+            raise UsageError(f"--push: {error}") from error
+        stdout.writelines(f"{line}\n" for line in _bake({**builds, "services": services}, options, Path(folder)))
     return Exit.OK
 
 
@@ -74,7 +70,7 @@ _PASSED = ("PATH", "HOME", "DOCKER_CONFIG", "DOCKER_HOST", "DOCKER_TLS_VERIFY", 
 """What the docker command needs of the environment."""
 
 
-def _push(builds: dict[str, Any], options: argparse.Namespace, folder: Path) -> list[str]:
+def _bake(builds: dict[str, Any], options: argparse.Namespace, folder: Path) -> list[str]:
     """Builds and pushes the images, and names each with its digest; raises DockerError."""
     images = {name: f"{options.push}/{name}" for name in builds["services"]}
     if not images:

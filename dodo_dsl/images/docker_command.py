@@ -46,21 +46,6 @@ def require() -> None:
         raise DockerError(f"docker has no buildx: {advice.docker_plugin('buildx')}") from None
 
 
-def is_local(reference: str) -> bool:
-    """Whether the engine has an image."""
-    return bool(ask("image", "ls", "--quiet", reference))
-
-
-def size(reference: str) -> int:
-    """Bytes of an image, those of shared layers included."""
-    return int(ask("image", "inspect", "--format", "{{.Size}}", reference))
-
-
-def platform(reference: str) -> str:
-    """What an image of the engine is for, such as ``linux/arm64``."""
-    return ask("image", "inspect", "--format", "{{.Os}}/{{.Architecture}}", reference)
-
-
 def show(*words: str, folder: Path | None = None, variables: Mapping[str, str] | None = None) -> bool:
     """Whether a docker command succeeds, which shows its progress by itself."""
     sys.stdout.flush()

@@ -87,17 +87,6 @@ class Rig:
         node = self.node.get("privileged")
         return isinstance(node, Scalar) and node.value is True and not self.is_emulated
 
-    @property
-    def arch(self) -> str:
-        """What its computer is, such as ``arm64``; empty if ``dodo.yml`` does not say."""
-        return self.text("arch")
-
-    @property
-    def disk(self) -> int | None:
-        """Bytes that the images of its tests may take on its computer; None for no limit but the disk's own."""
-        written = self.text("disk")
-        return int(quantity.convert(written, "B")) if written else None
-
     def text(self, key: str) -> str:
         """The string at a dotted key; empty if there is none."""
         entry = self.entry(key)

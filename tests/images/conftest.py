@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import os
 import shutil
 import subprocess
 import sys
@@ -48,8 +49,9 @@ def base_image() -> str:
 def build(base_image: str, *words: str) -> dict[str, str]:
     """References by name of images built as a user would."""
     command = [sys.executable, "-m", "dodo_dsl", "images", "build", *words, "--offline-wheels"]
-    command += ["--base-image", base_image, "--source", SOURCE]
-    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=1800)
+    command += ["--base-image", base_image]
+    variables = {**os.environ, "SOURCE": SOURCE, "DOCKER_IMAGE": WITH_PROGRAMS}
+    result = subprocess.run(command, cwd=ROOT, env=variables, capture_output=True, text=True, check=False, timeout=1800)
     assert result.returncode == 0, result.stdout[-4000:] + result.stderr
     lines = [line.split() for line in result.stdout.splitlines() if line.startswith("built ")]
     return {line[1].rpartition("/")[2].rpartition(":")[0]: line[1] for line in lines}

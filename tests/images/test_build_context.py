@@ -32,14 +32,14 @@ def test_the_engine_gets_no_less_than_is_copied() -> None:
     assert [name for name in copied() if not any(f"{name}/".startswith(f"{one}/") for one in sent)] == []
 
 
-def test_wheels_and_builds_come_along(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    root, wheels = tmp_path / "root", tmp_path / "some"
-    for file in (root / "build/time/dodo-time", root / "build/firmware/gantry.elf", wheels / "radar-1.0.whl"):
+def test_builds_come_along(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    root = tmp_path / "root"
+    for file in (root / "build/time/dodo-time", root / "build/firmware/gantry.elf"):
         file.parent.mkdir(parents=True, exist_ok=True)
         file.touch()
     monkeypatch.setattr(package_data, "root", lambda: root)
-    build_context.assemble(tmp_path / "context", [wheels])
-    for name in ("build/time/dodo-time", "build/firmware/gantry.elf", "wheels/radar-1.0.whl"):
+    build_context.assemble(tmp_path / "context")
+    for name in ("build/time/dodo-time", "build/firmware/gantry.elf"):
         assert (tmp_path / "context" / name).is_file()
 
 

@@ -39,8 +39,13 @@ FAILS = 'case "$2" in bake) exit 1;; esac'
 @pytest.mark.parametrize(
     ("program", "words", "code", "said"),
     [
-        (HAS_NONE, "build colision", Exit.USAGE, ["'colision'; did you mean 'collision' or 'vision'?"]),
-        (HAS_NONE, "build zzz", Exit.USAGE, ["there is no image 'zzz'; known: base, beacon, camera"]),
+        (HAS_NONE, "build colision", Exit.USAGE, ["did you mean 'collision' or 'vision'?"]),
+        (
+            HAS_NONE,
+            "build zzz",
+            Exit.USAGE,
+            ["nor a Dockerfile next to its service.yml; known: base, be"],
+        ),
         ("", "build", Exit.ERROR, ["the docker command is missing: install Docker Engine"]),
         ("echo 'Cannot connect to x.' >&2; exit 1", "build", Exit.ERROR, ["no Docker engine answers (Cannot con"]),
         ('case "$1" in buildx) exit 1;; *) echo 28.0;; esac', "build", Exit.ERROR, ["install docker-buildx-plugin"]),
@@ -65,8 +70,8 @@ def test_what_is_missing(program: str, words: str, code: Exit, said: list[str], 
 def noting(docker: Path) -> Path:
     """A docker command that notes what it is asked to do, and the file with its notes."""
     notes = docker.parent / "notes"
-    answers = "image-ls) echo 1;; image-inspect) echo 7000000;; buildx-version|version-*) ;;"
-    script(docker, f'case "$1-$2" in {answers} *) echo "$PREFIX $TAG $SOURCE $BASE_IMAGE:" "$@" >>{notes};; esac')
+    answers = "buildx-version|version-*) ;;"
+    script(docker, f'case "$1-$2" in {answers} *) echo "$PREFIX $TAG $BASE_IMAGE:" "$@" >>{notes};; esac')
     return notes
 
 
@@ -75,16 +80,16 @@ BAKE = "buildx bake --file services/docker-bake.hcl"
 
 def test_the_bake_file_is_built_or_pushed(docker: Path, tmp_path: Path) -> None:
     notes = noting(docker)
-    words = ("--tag", "1", "--platform", "linux/arm64", "--source", "https://x", "--base-image", "debian")
+    words = ("--tag", "1", "--platform", "linux/arm64", "--base-image", "debian")
     code, said = run("build", "collision", "vision", *words)
     flags = f"{BAKE} --load --set *.platform=linux/arm64"
-    assert notes.read_text().splitlines() == [f"dodo 1 https://x debian: {flags} {n}" for n in ("vision", "collision")]
-    assert (code, said) == (0, "built dodo/vision:1  7 MB\nbuilt dodo/collision:1  7 MB\n")
+    assert notes.read_text().splitlines() == [f"dodo 1 debian: {flags} {n}" for n in ("vision", "collision")]
+    assert (code, said) == (0, "built dodo/vision:1\nbuilt dodo/collision:1\n")
     notes.unlink()
     (tmp_path / "dodo.yml").write_text('dodo: 1\nimages: {prefix: registry.example.org/team, tag: "7"}\n')
-    code, said = run("push", "base", "--sbom")
-    assert notes.read_text() == f"registry.example.org/team 7  : {BAKE} --push --sbom=true base\n"
-    assert (code, said) == (0, "pushed registry.example.org/team/base:7  7 MB\n")
+    code, said = run("push", "base")
+    assert notes.read_text() == f"registry.example.org/team 7 : {BAKE} --push base\n"
+    assert (code, said) == (0, "pushed registry.example.org/team/base:7\n")
 
 
 def test_what_is_there_for_one_platform_is_built_for_that_alone(docker: Path) -> None:

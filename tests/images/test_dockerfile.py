@@ -5,7 +5,7 @@ import subprocess
 from pathlib import Path
 
 from dodo_dsl import __version__
-from dodo_dsl.images.names import DODO, SANDBOX, SHARED, known
+from dodo_dsl.cli.images import DODO, SANDBOX, SHARED, known
 from dodo_dsl.spec.manifest import load_manifests
 from tests.images.conftest import ROOT
 from tests.images.targets import folders_of, targets

@@ -19,7 +19,7 @@ def dodo(built: dict[str, str], base_image: str) -> Iterator[str]:
     """The image on the layers of the others, as it stands on their last stage."""
     if with_programs(base_image) != WITH_PROGRAMS:
         pytest.skip(f"not all of {', '.join((*PROGRAMS, *PLUGINS))} are on this machine (scripts/install-test-tools)")
-    words = ("dodo", "--prefix", "dodo-test", "--tag", TAG, "--docker-image", WITH_PROGRAMS)
+    words = ("dodo", "--prefix", "dodo-test", "--tag", TAG)
     yield build(WITH_PROGRAMS, *words)["dodo"]
     docker("image", "rm", "--force", f"dodo-test/dodo:{TAG}")
 
