@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span
+from dodo_dsl.diagnostics import Diagnostic, Span
 
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 32
@@ -125,9 +125,9 @@ def resolve(text: str) -> Plain:
 
 
 class _Stop(Exception):
-    def __init__(self, span: Span, rule: str, message: str, hint: str = "", fix: Fix | None = None) -> None:
+    def __init__(self, span: Span, rule: str, message: str, hint: str = "") -> None:
         super().__init__(message)
-        self.diagnostic = Diagnostic(span, rule, message, hint, fix=fix)
+        self.diagnostic = Diagnostic(span, rule, message, hint)
 
 
 @dataclass
@@ -297,16 +297,14 @@ def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
         return _unreadable(file, text, error, problem)
     begin, context = getattr(error, "context_mark", None), getattr(error, "context", None) or ""
     began = (begin.line, begin.column) if begin else None
-    failure = Failure(file, text, problem, (mark.line, mark.column), context, began, _LOADER)
-    if found := slip(failure):
+    lines = text.splitlines()
+    if found := slip(Failure(file, lines, problem, (mark.line, mark.column), context, began)):
         return found
-    if begin and mark.line >= len(failure.lines):  # what is never closed is shown where it is opened
+    if begin and mark.line >= len(lines):  # what is never closed is shown where it is opened
         mark = begin
-    if "simple key" in context and begin:
-        key = Span(file, begin.line + 1, begin.column + 1)
-        return Diagnostic(key, "yaml-syntax", "not YAML: expected 'key: value', with a space after the colon")
     where = f" {context} that begins in line {begin.line + 1}" if context and begin else ""
-    return Diagnostic(Span(file, mark.line + 1, mark.column + 1), "yaml-syntax", f"not YAML: {problem}{where}")
+    hint = "look at brackets, quotes and indentation here and in the lines above"
+    return Diagnostic(Span(file, mark.line + 1, mark.column + 1), "yaml-syntax", f"not YAML: {problem}{where}", hint)
 
 
 def parse(text: str, file: str) -> tuple[Node | None, list[Diagnostic]]:

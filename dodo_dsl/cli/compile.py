@@ -1,79 +1,28 @@
-"""dodo compile: check tests and write their compose files and child pipeline.
-
-With ``--check --fix`` it writes what has exactly one fix into the files, and shows it as a diff.
-"""
+"""dodo compile: check tests and write their compose files and child pipeline."""
 
 import argparse
-import difflib
 import json
 import os
 import re
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
-from dodo_dsl import atomic, package_data
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.display import write_diagnostics
 from dodo_dsl.cli.errors import Exit, UsageError, files_of_the_user
 from dodo_dsl.compiler import Checked, plan
 from dodo_dsl.diagnostics import (
     Diagnostic,
-    Fix,
-    Span,
-    forget_lines,
     format_gitlab,
     format_json,
     format_text,
     has_errors,
     ordered,
-    shown_path,
 )
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.plan.pipeline import DEFAULT_TAGS, JobOptions
 from dodo_dsl.plan.test_files import FilesError
-from dodo_dsl.terminal import printable
-
-Fixes = dict[Span, Fix]
-
-
-def apply_fixes(diagnostics: Iterable[Diagnostic], root: Path) -> str:
-    """Fixes the files of the repository at ``root`` and returns the diff; each file appears whole. Raises OSError."""
-    by_file: dict[Path, Fixes] = defaultdict(dict)
-    for diagnostic in diagnostics:
-        path = Path(diagnostic.span.file)
-        if diagnostic.fix and path.is_file() and _is_own(path, root):
-            by_file[path.resolve()][diagnostic.span] = diagnostic.fix
-    return "".join(_mended(path, fixes) for path, fixes in sorted(by_file.items()))
-
-
-def _is_own(path: Path, root: Path) -> bool:
-    return path.resolve().is_relative_to(root.resolve()) and not package_data.is_shipped(path, root)
-
-
-def _mended(path: Path, fixes: Fixes) -> str:
-    """Writes one file and returns its diff; line ends, comments and layout stay."""
-    before = path.read_bytes().decode().splitlines(keepends=True)
-    after = list(before)
-    for span, fix in sorted(fixes.items(), reverse=True):
-        if span.line <= len(after):
-            after[span.line - 1] = _line(after[span.line - 1], span, fix)
-    if after == before:
-        return ""
-    atomic.write_bytes(path, "".join(after).encode())
-    name = shown_path(str(path))
-    return "".join(_shown(difflib.unified_diff(before, after, name, name, n=1)))
-
-
-def _line(line: str, span: Span, fix: Fix) -> str:
-    start, end = span.column - 1, span.column - 1 + span.length
-    return line[:start] + fix.mended(line[start:end]) + line[end:]
-
-
-def _shown(lines: Iterable[str]) -> Iterator[str]:
-    return (printable(line.rstrip("\r\n")) + "\n" for line in lines)
-
 
 FORMATS: dict[str, Callable[[Sequence[Diagnostic]], str]] = {
     "text": format_text,
@@ -85,14 +34,12 @@ EXAMPLES = """examples:
   dodo compile                             all tests of dodo.yml, into generated/
   dodo compile tests/my-test -o out        one folder of tests
   dodo compile --check                     problems of all tests; writes nothing
-  dodo compile --check --fix               writes what has exactly one fix, and shows it as a diff
   dodo compile --check --format gitlab     the same as a code quality report
   dodo compile --tags '' --image dodo-runner       its jobs run on any runner, in this image
 """
 
 
 _MOST_LINES = 100
-_MOST_PASSES = 5
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -106,8 +53,6 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="output folder (default: generated)")  # fmt: skip
     parser.add_argument("--check", action="store_true", help="write nothing; show problems and what is stale in DIR")
     parser.add_argument("-q", "--quiet", action="store_true", help="print only problems, and what is stale")
-    parser.add_argument("--fix", action="store_true",
-                        help="with --check: correct names, units and spaces that have exactly one fix")  # fmt: skip
     parser.add_argument("--format", choices=tuple(FORMATS), default="text",
                         help="format of diagnostics (default: text); with gitlab the text goes to stderr")  # fmt: skip
     parser.add_argument("--tags", type=_tags, default=DEFAULT_TAGS, metavar="TAGS",
@@ -182,30 +127,14 @@ def _json_list(text: str) -> list[Any] | None:
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # to start its threads takes a tenth of a check's processor time
-    if options.fix and not options.check:
-        raise UsageError("--fix applies to --check")
     if options.images and options.check:
         raise UsageError("--images are for what is written: call dodo compile without --check")
     checked = selection.select(options.path, (), options.application)
-    if options.fix:
-        checked = _fixed(checked, options, stdout if options.format == "text" else stderr)
     if not options.quiet:
         (stdout if options.format == "text" else stderr).write(selection.left_out(checked))
     if options.check:
         return _check(checked, options, stdout, stderr)
     return _write(checked, options, stdout, stderr)
-
-
-def _fixed(checked: Checked, options: argparse.Namespace, out: TextIO) -> Checked:
-    """The tests as they are with all fixes, one of which may bring the next to light."""
-    for _ in range(_MOST_PASSES):
-        diff = apply_fixes(checked.diagnostics, checked.deployment.root)
-        if not diff:
-            break
-        out.write(diff)
-        forget_lines()
-        checked = selection.select(options.path, (), options.application)
-    return checked
 
 
 def _log(style: str, stdout: TextIO, stderr: TextIO) -> TextIO | None:

@@ -51,19 +51,6 @@ def test_a_slip_is_told_once(name: str, told: Said) -> None:
     assert said["hint"]
 
 
-@pytest.mark.parametrize(
-    "name", ["block-above-colon", "char-byte-order-mark", "char-nbsp", "list-dash-no-blank-second"]
-)
-def test_its_fix_makes_it_yaml(name: str) -> None:
-    text = written(name)
-    _, (problem,) = parse(text, name)
-    assert problem.fix is not None
-    lines, at = text.split("\n"), problem.span
-    line, start, end = lines[at.line - 1], at.column - 1, at.column - 1 + at.length
-    lines[at.line - 1] = line[:start] + problem.fix.mended(line[start:end]) + line[end:]
-    assert parse("\n".join(lines), name)[1] == []
-
-
 def test_patterns_are_not_tried_on_lines_as_long_as_a_file() -> None:
     """Some would take minutes for what strangers write."""
     messages = [parse(f"a: {'x ' * words}y: z", "long.yml")[1][0].message for words in (100, 100_000)]

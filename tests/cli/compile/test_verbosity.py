@@ -8,7 +8,23 @@ import pytest
 
 from dodo_dsl.cli.main import main
 from dodo_dsl.package_data import registry
-from tests.cli.compile.test_fixes import SPEC
+
+SPEC = """\
+dodo: 1
+name: drive
+description: Drive to the finish line.
+level: sil
+kind: closed-loop
+timeout: 60 s
+clock: lockstep
+environment:
+  camera: {uses: virtual-camera, with: {map-path: ../maps/straight, freq: 10 Hz}}
+action:
+  vehicle: {uses: dynamic-model}
+  pose:    {uses: integrator, with: {yaw: 84 deg}}
+evaluation:
+  track: {uses: collision, with: {goal: finish, max-time: 40 s}}
+"""
 
 
 @pytest.fixture(autouse=True)

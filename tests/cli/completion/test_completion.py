@@ -35,7 +35,7 @@ def asked(line: str) -> list[str]:
         ("dodo ru", ["run"]),
         ("dodo run sil-closed-l", ["sil-closed-left-curve"]),
         ("dodo run --backend m", ["mixed"]),
-        ("dodo compile -", ["--fix", "--format"]),
+        ("dodo compile -", ["--format"]),
         ("dodo explain wrong-un", ["wrong-unit"]),
     ],
 )
