@@ -24,7 +24,8 @@ _OF_KEYS = (
     _Pattern(rf"(?!.*: )\s*(?:- )?{_KEY}(?P<at>:)(?P<value>(?!//)[^\s:#].*)",
              "a space is missing after the colon of '{key}'", "write '{key}: {value}'"),
     _Pattern(rf"(?!.*: )(?!.*:\s*$)\s*(?:- )?(?P<at>){_KEY}(?:[\s=]+(?P<value>\S.*)|\s*)",
-             "a colon is missing after '{key}'", "write '{key}: {value}', or indent the line if it goes on with the text above"),
+             "a colon is missing after '{key}'",
+             "write '{key}: {value}', or indent the line if it goes on with the text above"),
 )  # fmt: skip
 _IN_BRACKETS = (
     _Pattern(r".*(?P<at>\$)\0(?P<name>\{[\w.-]+\}).*", "'${name}' within brackets needs quotes", 'write "${name}"'),

@@ -73,8 +73,7 @@ def test_json_has_the_same(folder: Path) -> None:
     assert code == 2
     rows = json.loads(out)
     assert [row["slug"] for row in rows][:2] == ["example--yaw-80-deg--frame-id-0", "example--yaw-80-deg--frame-id-3"]
-    (yaw,) = [argument for argument in rows[3]["services"][2]["arguments"] if argument["name"] == "yaw"]
-    assert yaw == {"name": "yaw", "value": "100", "unit": "deg", "origin": "tests/example/example.dodo.yml:14"}
+    assert rows[3]["services"][2]["values"]["yaw"] == "100 deg"
     assert rows[0]["asked"][0]["port"] == "opendlv.proxy.GroundSteeringRequest"
 
 
