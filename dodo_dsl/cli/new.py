@@ -4,14 +4,14 @@ import argparse
 import importlib.util
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
-from dodo_dsl import __version__, package_data, source
+from dodo_dsl import __version__, package_data
 from dodo_dsl.application.read import as_written
 from dodo_dsl.cli import existing_application
-from dodo_dsl.cli.errors import Exit, UsageError, files_of_the_user
+from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.cli.new_files import (
     SCHEMA_FOLDERS,
     SCHEMAS,
@@ -29,9 +29,8 @@ from dodo_dsl.cli.new_files import (
 from dodo_dsl.compiler import Checked, load
 from dodo_dsl.diagnostics import did_you_mean, format_text, shown_path
 from dodo_dsl.spec.deployment import FILE_NAME
-from dodo_dsl.spec.model import KINDS, LEVELS, Spec
+from dodo_dsl.spec.model import KINDS, LEVELS
 from dodo_dsl.spec.registry import KEYWORDS, SUFFIX
-from dodo_dsl.terminal import printable
 
 COMPOSE_FILES = ("docker-compose.yml", "docker-compose.yaml", "compose.yml", "compose.yaml")
 PIPELINE = ".gitlab-ci.yml"
@@ -58,35 +57,22 @@ _NO_APPLICATION = (
 )
 
 
-_STARTERS = {
-    ("bus", "python"): ("python",),
-    ("bus", "cpp"): ("cpp",),
-    ("printed", "python"): ("python", "printed"),
-    ("wheels", "python"): ("python", "wheels"),
-    ("ros", "python"): ("ros", "ros-python"),
-    ("ros", "cpp"): ("ros", "ros-cpp"),
-}
-"""Folders of templates of an application, of which later ones win, by how it answers and by its language."""
 _BUILDS = {
     "cpp": ("cmake -B build", "cmake --build build --parallel --target steering"),
-    "ros-python": (f"PATH-OF-DODO'S-CHECKOUT/scripts/install-ros .ros  (or take ROS' own Python, in {FILE_NAME})",),
-    "ros-cpp": (". /opt/ros/kilted/setup.bash && colcon build",),
+    "ros": (f"PATH-OF-DODO'S-CHECKOUT/scripts/install-ros .ros  (or take ROS' own Python, in {FILE_NAME})",),
 }
-"""What is to be done before a program of a folder can run."""
+"""What is to be done before a program of a folder of templates can run."""
 
 EXAMPLES = """examples:
-  dodo new                                             lists what a test can start from
   dodo new sil-my-curve                                a closed-loop simulation that compiles
   dodo new hil-my-curve --level hil                    the same on a rig, or emulated by dodo run --emulate
   dodo new sil-my-dark --extends sil-my-curve          a changed copy of another test
   dodo new dil-mine --level dil --rec drive.rec        your own recording, and its signal as the target
   dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a shipped test and its files
   dodo new --map chicane --line 'straight 1 m, left 45 deg radius 1 m, right 45 deg radius 1 m, straight 1 m'
-  dodo new --map hall --line points.csv --width '80 cm'  a map along points, x and y in m
   dodo new --application                               an application that drives, with a test that it passes
   dodo new --application --language cpp                the same in C++, on libcluon
-  dodo new --application --ros                         a ROS 2 node, in Python or with --language cpp
-  dodo new --application --answers printed             one that prints its answers; wheels: two wheels, range sensors
+  dodo new --application --ros                         a ROS 2 node in Python
   dodo new --deployment                                dodo.yml, application and GitLab pipeline in this folder
   dodo new --schemas                                   JSON schemas, by which editors complete dodo.yml and tests
 """
@@ -94,7 +80,7 @@ EXAMPLES = """examples:
 
 def add(parser: argparse.ArgumentParser) -> None:
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("name", nargs="?", metavar="NAME", help="name of the new test (default: show what it can be)")
+    what.add_argument("name", nargs="?", metavar="NAME", help="name of the new test")
     what.add_argument("--map", metavar="NAME", help="write a map of a track, into the folder maps of your tests")
     what.add_argument(
         "--application", action="store_true", help="write a small application and a first test that it passes"
@@ -113,18 +99,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     of_test.add_argument("--rec", metavar="FILE.rec", type=Path,
                          help="recording that a new dil test plays, with its target")  # fmt: skip
     of_map = parser.add_argument_group("of a map")
-    of_map.add_argument(
-        "--line", metavar="LINE", help="its centre line, as below, or a CSV file of points, x and y in m"
-    )
+    of_map.add_argument("--line", metavar="LINE", help="its centre line, as below")
     of_map.add_argument("--width", metavar="W", help="width of the track (default: 50 cm)")
     of_map.add_argument("--lap", action="store_true", help="the line ends where it begins")
     of_application = parser.add_argument_group("of an application")
     of_application.add_argument("--language", choices=("python", "cpp"), help="default: python")
-    of_application.add_argument(
-        "--answers", choices=("bus", "printed", "wheels"),
-        help="steering and pedal on the bus, the same printed, or a pedal for each of two wheels, by range sensors "
-        "(default: bus)",
-    )  # fmt: skip
     of_application.add_argument("--ros", action="store_true", help="a ROS 2 node: pictures in, Twist out")
 
 
@@ -133,7 +112,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     for what, holds, names in (
         ("a test", is_test, ("level", "kind", "extends", "rec")),
         ("--map", bool(options.map), ("line", "width", "lap")),
-        ("--application", options.application, ("language", "answers", "ros")),
+        ("--application", options.application, ("language", "ros")),
     ):
         if given := [name for name in names if getattr(options, name) and not holds]:
             raise UsageError(f"--{given[0]} applies to {what}")
@@ -149,32 +128,23 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 
 
 def _application(options: argparse.Namespace, stdout: TextIO) -> int:
-    if options.ros and options.answers:
-        raise UsageError("--answers applies to OpenDLV applications: with --ros the answer is a Twist")
-    kind = ("ros" if options.ros else options.answers or "bus", options.language or "python")
-    if kind not in _STARTERS:
-        raise UsageError(f"--answers {kind[0]} is there in Python alone")
+    if options.ros and options.language:
+        raise UsageError("--language applies to OpenDLV applications: the node of --ros is written in Python")
     root, has_ros = Path.cwd(), importlib.util.find_spec("rclpy") is not None
-    files = {FILE_NAME: _dodo_yml(root, COMPOSE_FILES[0], {})}
-    colcon = '"bash", "-c", ". install/setup.bash && exec install/steering/lib/steering/steering"'
-    node = f"{'python' if has_ros else '.ros/bin/python'}, steering.py"
-    values = {
-        "base": f"dodo/vision:{__version__}",
-        "language": kind[1],
-        "process": colcon if kind[1] == "cpp" else node,
-    }
-    for folder in _STARTERS[kind]:
-        files |= filled_folder(folder, root, **values)
+    if there := compose_file(root):
+        raise UsageError(f"'{there}' exists already; nothing was written; name it in {FILE_NAME}: application: {there}")
+    kind = "ros" if options.ros else options.language or "python"
+    files = {FILE_NAME: _dodo_yml(root, COMPOSE_FILES[0])}
+    values = {"base": f"dodo/vision:{__version__}", "process": "python" if has_ros else ".ros/bin/python"}
+    files |= filled_folder(kind, root, **values)
     test = f"{REGISTRY}/{_FIRST}/{_FIRST}{SUFFIX}"
     if test not in files:
         files[test] = New(root / test, filled(f"tests/{LEVEL}-{KIND}{SUFFIX}", name=_FIRST, pictures=""))
     if not (root / ".gitignore").exists():
         files[".gitignore"] = New(root / ".gitignore", filled("gitignore"))
-    if there := compose_file(root):
-        raise UsageError(f"'{there}' exists already; nothing was written; name it in {FILE_NAME}: application: {there}")
     write_new([*files.values(), *world_files(files[test].content, root / REGISTRY)], stdout)
     program = next(name for name in files if name.startswith("steering."))
-    builds = () if has_ros and kind == ("ros", "python") else _BUILDS.get(_STARTERS[kind][-1], ())
+    builds = () if has_ros else _BUILDS.get(kind, ())
     say_next([*builds, f"dodo run {_FIRST}", f"edit {program} and the test"], stdout)
     return Exit.OK
 
@@ -184,34 +154,29 @@ def compose_file(root: Path) -> str:
     return next((name for name in COMPOSE_FILES if (root / name).is_file()), "")
 
 
-def _dodo_yml(root: Path, application: str, without: Mapping[str, str]) -> New:
-    return New(root / FILE_NAME, filled(FILE_NAME, application=application, without=without))
+def _dodo_yml(root: Path, application: str) -> New:
+    return New(root / FILE_NAME, filled(FILE_NAME, application=application))
 
 
 def _deployment(stdout: TextIO) -> int:
     """What there is stays; of a pipeline that is there, the lines are shown that it lacks."""
     root = Path.cwd()
-    pipeline = filled("deployment/gitlab-ci.yml", stage=_stage(root / PIPELINE), images=_is_built(root))
+    pipeline = filled("deployment/gitlab-ci.yml")
     own = compose_file(root)
     application = own or COMPOSE_FILES[0]
+    templates = {name: package_data.templates() / name / "template.yml" for name in package_data.PIPELINES}
     files = [
-        _dodo_yml(root, application, existing_application.replaced(root / own) if own else {}),
+        _dodo_yml(root, application),
         New(root / application, filled("deployment/docker-compose.yml")),
         New(root / PIPELINE, pipeline),
-        *(
-            New(
-                root / ".gitlab/dodo" / f"{name}.gitlab-ci.yml",
-                (package_data.templates() / name / "template.yml").read_bytes(),
-            )
-            for name in package_data.PIPELINES
-        ),
+        *(New(root / f".gitlab/dodo/{name}.gitlab-ci.yml", path.read_bytes()) for name, path in templates.items()),
         New(root / ".gitignore", filled("gitignore")),
     ]
     kept = [file.path for file in files if file.path.exists()]
     write_new([file for file in files if file.path not in kept], stdout)
     stdout.writelines(f"kept: {shown_path(str(path))}\n" for path in kept)
     steps = [] if own else [f"name your services in {application}"]
-    if root / PIPELINE in kept and "dodo" not in (root / PIPELINE).read_text(encoding="utf-8", errors="replace"):
+    if root / PIPELINE in kept and b"dodo" not in (root / PIPELINE).read_bytes():
         lines = "".join(f"        {line}\n" for line in pipeline.decode().splitlines() if not line.startswith("#"))
         steps.append(f"add to {PIPELINE}:\n{lines}".rstrip())
     steps += [
@@ -221,20 +186,6 @@ def _deployment(stdout: TextIO) -> int:
     ]
     say_next(steps, stdout)
     return Exit.OK
-
-
-def _stage(pipeline: Path) -> str:
-    """A stage of the pipeline that is there; GitLab's own where it names none, or none that can be read."""
-    node, _ = source.read(pipeline)
-    written = source.part(node, "stages") if node else None
-    known = written.items if isinstance(written, source.Sequence) and not written.tag else ()
-    stages = [printable(item.text) for item in known if isinstance(item, source.Scalar)]
-    return "test" if "test" in stages or not stages else stages[0]
-
-
-def _is_built(root: Path) -> bool:
-    """Whether programs have to be built before tests."""
-    return any((root / name).is_file() for name in ("CMakeLists.txt", "package.xml"))
 
 
 def _schemas(stdout: TextIO) -> int:
@@ -255,14 +206,11 @@ def _map(options: argparse.Namespace, stdout: TextIO) -> int:
     from dodo_dsl.cli import new_map
 
     if not options.line:
-        raise UsageError(
-            f"--map needs --line, the centre line of the track: {new_map.EXPECTED}, or a CSV file of points"
-        )
+        raise UsageError(f"--map needs --line, the centre line of the track: {new_map.EXPECTED}")
     _check_name(options.map, ())
     checked = load([])
     folder = _registry(checked) / "maps" / options.map
-    with files_of_the_user():
-        track = new_map.track(options.line, options.width or f"{new_map.LANE} m", options.lap)
+    track = new_map.track(options.line, options.width or f"{new_map.LANE} m", options.lap)
     content = (new_map.as_json(new_map.track_map(track)) + "\n").encode()
     files = [
         New(file.path, content) if file.path.name == "map.json" else file for file in map_files("straight", folder)
@@ -279,18 +227,15 @@ def _map(options: argparse.Namespace, stdout: TextIO) -> int:
 
 
 def _test(options: argparse.Namespace, stdout: TextIO) -> int:
-    _refuse_contradictions(options)
-    shipped = load([package_data.registry()])
     if options.name is None:
-        stdout.write(_listing(shipped.specs))
-        return Exit.USAGE
-    checked = load([])
+        raise UsageError("name the new test: dodo new NAME; dodo new --help shows what it can be")
+    _refuse_contradictions(options)
+    shipped, checked = load([package_data.registry()]), load([])
     _check_name(options.name, [spec.location.stem for spec in checked.specs])
     root, registry = checked.deployment.root.resolve(), _registry(checked)
     files = []
     if checked.deployment.file is None:
-        own = compose_file(root)
-        files = [_dodo_yml(root, own, existing_application.replaced(root / own) if own else {})]
+        files = [_dodo_yml(root, compose_file(root))]
     made, note = _files(options, checked, shipped, registry, root)
     write_new([*files, *made], stdout)
     stdout.write(note)
@@ -380,16 +325,3 @@ def _from_another(
     if not base.location.root.resolve().is_relative_to(root):
         raise UsageError(f"'{base_name}' is outside this repository; a test extends tests of its registry")
     return extending_files(name, base, root), ""
-
-
-def _listing(shipped: Sequence[Spec]) -> str:
-    """Everything that a new test may begin with."""
-    rows = [
-        (f"--level {level} --kind {kind}", f"a copy of {base}" if base else "a first test")
-        for (level, kind), base in STARTS.items()
-    ]
-    copies = {f"--extends {spec.name}": spec.description or "" for spec in shipped}
-    width = max(map(len, [*copies, *(words for words, _ in rows)]))
-    lines = [f"  {words.ljust(width)}  {text}\n" for words, text in (*rows, *copies.items())]
-    head = "dodo new NAME writes a first test of level sil and kind closed-loop; with other options it begins as\n"
-    return head + "".join(lines) + "dodo new --help says more\n"

@@ -27,7 +27,7 @@ Program = Callable[[float], tuple[float, float]]
 """Steering (rad) and pedal by the time in s."""
 NAMES = [
     *("sil-closed-straight", "sil-closed-left-curve", "sil-closed-kiwi-track", "sil-closed-two-cars"),
-    *("hil-dynamic", "hil-closed-oval", "sil-first", "sil-first wheels"),
+    *("hil-dynamic", "hil-closed-oval", "sil-first"),
 ]
 BENDS = ("sil-closed-left-curve", "sil-closed-kiwi-track", "sil-closed-two-cars", "hil-closed-oval")
 TICK, FRAME = 10_000, 100_000  # us
@@ -71,12 +71,11 @@ PROGRAMS: dict[str, Program] = {
 @pytest.fixture(scope="module")
 def tests(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ResolvedTest]:
     found = {test.spec.slug: test for test in compiler.load([package_data.registry()]).tests}
-    for name, words in (("sil-first", ()), ("sil-first wheels", ("--answers", "wheels"))):
-        folder = tmp_path_factory.mktemp("new")
-        with pytest.MonkeyPatch.context() as patch:
-            patch.chdir(folder)
-            assert run("new", "--application", *words)[0] == 0
-            (found[name],) = compiler.load([], start=folder).tests
+    folder = tmp_path_factory.mktemp("new")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert run("new", "--application")[0] == 0
+        (found["sil-first"],) = compiler.load([], start=folder).tests
     for example in ("wheels", "ranges"):
         (test,) = compiler.load([], start=package_data.root() / "examples" / example).tests
         found[test.spec.slug] = test
