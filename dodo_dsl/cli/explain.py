@@ -170,7 +170,7 @@ def _asked(wiring: Wiring) -> Iterator[dict[str, Any]]:
 
 
 def _file(instances: Sequence[Explanation]) -> str:
-    """The first instance of a file whole, and the number of the others, which only other values tell apart."""
+    """The first instance of a file whole, and the number of the others, which have other values."""
     one, *others = instances
     about = [one["level"], one["kind"], f"clock {one['clock']}", *filter(None, (one["rig"], one["pool"]))]
     parts = [f"{printable(one['name'])} ({printable(', '.join(about))})\n{printable(one['file'])}\n"]

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Collection, Sequence
 from types import ModuleType
-from typing import Any, NamedTuple, NoReturn, TextIO
+from typing import NamedTuple, NoReturn, TextIO
 
 from dodo_dsl import __version__
 from dodo_dsl.cli.errors import Exit, exit_code, sentence
@@ -36,7 +36,7 @@ COMMANDS = {
     "rank": Subcommand("rank", "rank applications by the goals of their tests"),
     "rec": Subcommand("rec", "inspect, cut, export and import recordings"),
     "lsp": Subcommand("lsp", "check tests in an editor whenever one is saved"),
-    "images": Subcommand("images", "build, push and pull images"),
+    "images": Subcommand("images", "build and push images"),
     "rig": Subcommand("rig", "operate a rig manually: status, motion, calibration, quarantine and camera"),
     "doctor": Subcommand("doctor", "check what this machine can run, what it lacks and what killed runs left behind"),
 }
@@ -56,52 +56,13 @@ levels of tests:
 """
 
 
-_PLACEHOLDERS = {"COMMAND": "command", "ACTION": "action"}
-
-
 class Arguments(argparse.ArgumentParser):
-    """Like argparse's parser, but a subcommand reports its unknown options, with what a mistyped word may mean."""
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
-        found, unknown = super().parse_known_args(args, namespace)
-        if unknown:
-            self.error(self._unknown(unknown[0]))
-        return found, unknown
+    """Like argparse's parser, but no error shows the password of a storage."""
 
     def error(self, message: str) -> NoReturn:
         from dodo_dsl.search.store import masked
 
         super().error(masked(message))
-
-    def _check_value(self, action: argparse.Action, value: Any) -> None:
-        """Raises ArgumentError, without its own argument, for what is none of an action's choices."""
-        if action.choices is not None and value not in action.choices:
-            raise argparse.ArgumentError(None, _wrong_choice(action, str(value)))
-
-    def _unknown(self, word: str) -> str:
-        option = word.partition("=")[0]
-        if not option.startswith("-"):
-            return f"'{word}' is one word too many"
-        options = [known for action in self._actions for known in action.option_strings if known.startswith("--")]
-        return f"unknown option '{option}'" + _hint(option, options)
-
-
-def _wrong_choice(action: argparse.Action, word: str) -> str:
-    known = [str(choice) for choice in action.choices or ()]
-    what = "/".join(action.option_strings) or str(action.metavar or action.dest)
-    if what in _PLACEHOLDERS:
-        return f"unknown {_PLACEHOLDERS[what]} '{word}'" + _hint(word, known)
-    return f"{what}: '{word}' is not one of {', '.join(known)}" + _hint(word, known, only_near=True)
-
-
-def _hint(word: str, known: Sequence[str], *, only_near: bool = False) -> str:
-    """A suggestion; the hyphens before an option make no word like another."""
-    from dodo_dsl.diagnostics import closest
-
-    names = {option.lstrip("-"): option for option in known}
-    if near := closest(word.lstrip("-"), names):
-        return "; did you mean " + " or ".join(f"'{names[name]}'" for name in near) + "?"
-    return "" if only_near else "; --help shows what there is"
 
 
 def parser(called: Collection[str] = tuple(COMMANDS)) -> argparse.ArgumentParser:
