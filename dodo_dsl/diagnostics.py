@@ -5,7 +5,6 @@ import functools
 import hashlib
 import os
 import re
-import unicodedata
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -192,24 +191,9 @@ def pieces(diagnostic: Diagnostic, width: int) -> Iterator[Piece]:
     yield f"{diagnostic.severity}[{diagnostic.rule}]", diagnostic.severity
     yield f": {printable(diagnostic.sentence)}\n", ""
     yield from _code_frame(span, width)
-    for hint in filter(None, (diagnostic.hint, _deceptive(diagnostic.message))):
+    if diagnostic.hint:
         yield "  hint: ", "hint"
-        yield f"{printable(hint)}\n", ""
-
-
-def _deceptive(message: str) -> str:
-    """What a value has that looks like another character, as word processors and web pages write it."""
-    if message.isascii():
-        return ""
-    for character in message:
-        name = f"{unicodedata.name(character, 'unnamed').lower()} (U+{ord(character):04X})"
-        if unicodedata.category(character) in ("Zs", "Cf") and character != " " and name not in message:
-            return f"it contains a {name}, which looks like a space or nothing: write it anew"
-        if unicodedata.category(character) in ("Pi", "Pf"):
-            return (
-                f"'{character}' is a typographic quotation mark, which belongs to the text in YAML: write \" or nothing"
-            )
-    return ""
+        yield f"{printable(diagnostic.hint)}\n", ""
 
 
 def format_text(diagnostics: Sequence[Diagnostic], width: int | None = None) -> str:

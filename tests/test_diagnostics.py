@@ -2,7 +2,7 @@
 
 import pytest
 
-from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean, format_text
+from dodo_dsl.diagnostics import closest, did_you_mean
 
 SERVICES = ("camera", "clock", "dynamic-model", "integrator", "virtual-camera")
 
@@ -22,17 +22,3 @@ def test_a_misspelt_word_suggests_the_nearest() -> None:
 
 def test_another_word_suggests_nothing() -> None:
     assert closest("lidar", SERVICES) == []
-
-
-@pytest.mark.parametrize(
-    ("value", "what"),
-    [
-        ("60\u00a0s", "a no-break space (U+00A0)"),
-        ("s\u200bil", "a zero width space (U+200B)"),
-        ("“sil”", "'“' is a typo"),
-    ],
-)
-def test_what_looks_like_another_character_has_a_hint(value: str, what: str) -> None:
-    text = format_text([Diagnostic(Span("x.dodo.yml"), "wrong-value", f"'{value}' is not allowed")])
-    assert "\n  hint: " in text
-    assert what in text

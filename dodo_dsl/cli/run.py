@@ -1,15 +1,9 @@
-"""dodo run: run tests and judge the application.
-
-It holds the report's folder, and says so when another run does. It chooses the backend of a run that names none.
-"""
+"""dodo run: run tests and judge the application."""
 
 import argparse
 import asyncio
-import contextlib
-import fcntl
 import gc
-import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -42,35 +36,6 @@ from dodo_dsl.run.work_folder import reap_folders, work_folder
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.model import CLOCKS, LEVELS
 from dodo_dsl.terminal import printable
-
-
-@contextlib.contextmanager
-def reserved(folder: Path, stdout: TextIO) -> Iterator[None]:
-    """Holds a report's folder, as long as this process lives at most; says so when another run holds it already.
-
-    Both go on: their tests have their own folders there, and the pages and results are those of the later end.
-    """
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    try:
-        if not _locked(descriptor):
-            stdout.write(
-                f"note: another run also writes into '{folder}': the last run to finish overwrites the report; "
-            )
-            stdout.write("--report names another folder\n")
-        yield
-    finally:
-        os.close(descriptor)
-
-
-def _locked(descriptor: int) -> bool:
-    """Whether nobody else holds the lock; True as well on file systems without locks."""
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return True
-    return True
 
 
 def choose_backend(plans: Sequence[Plan]) -> BackendName:
@@ -191,11 +156,10 @@ def _main(options: argparse.Namespace, stdout: TextIO) -> int:
             runner = runner_of(options, jobs, deployment, quietly, load)
         gc.freeze()
         gc.enable()
-        with reserved(options.report, stdout):
-            source, said = origin(options, deployment), options.verbosity
-            is_part = bool(options.test or options.level or options.compiled or options.shard != (1, 1))
-            others = run_report.earlier(options.report, [job.plan.name for job in jobs]) if is_part else None
-            outcomes, is_reported, repeats = run(runner, jobs, options.report, stdout, source, others, said)
+        source, said = origin(options, deployment), options.verbosity
+        is_part = bool(options.test or options.level or options.compiled or options.shard != (1, 1))
+        others = run_report.earlier(options.report, [job.plan.name for job in jobs]) if is_part else None
+        outcomes, is_reported, repeats = run(runner, jobs, options.report, stdout, source, others, said)
         if runner.kept:
             stdout.write("\n".join(["", *runner.kept, ""]))
             folder.kept = True

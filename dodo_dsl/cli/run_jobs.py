@@ -1,9 +1,4 @@
-"""From a command line of ``dodo run`` to jobs: compiled tests, also at samples, and the folders of their reports.
-
-``--samples`` takes tests at samples of their ranges. Shipped tests without a rig are left out: nobody asked for them.
-The fork server loads while tests are compiled: on another core, it costs no
-time then.
-"""
+"""From a command line of ``dodo run`` to jobs: compiled tests, also at samples, and the folders of their reports."""
 
 import argparse
 import contextlib
@@ -23,9 +18,8 @@ from dodo_dsl.diagnostics import has_errors, ordered, told_once
 from dodo_dsl.emit.output_folder import write
 from dodo_dsl.emit.render import PLAN_FILE
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.model import Plan, named, runs
 from dodo_dsl.plan.plan_json import PlanError, from_json
-from dodo_dsl.plan.runs import named, runs
 from dodo_dsl.plan.test_files import file_problem
 from dodo_dsl.report.results import FILE_NAME
 from dodo_dsl.run.backends import Job
@@ -117,10 +111,7 @@ def _usable(report: Path, slugs: Sequence[str]) -> Path:
         )
     except OSError as error:
         raise UsageError(f"'{report}' cannot take the report: {error.strerror}") from error
-    for slug in slugs:
-        if (report / slug / PLAN_FILE).exists() or any((report / slug).glob("*.dodo.yml")):
-            raise UsageError(f"'{report}' holds tests; name another folder with --report")
-    if not is_ours:
+    if not is_ours or any((report / slug / PLAN_FILE).exists() for slug in slugs):
         raise UsageError(f"'{report}' holds other files and no report; name a new or empty folder with --report")
     if not os.access(report, os.W_OK):
         raise UsageError(f"'{report}' cannot take the report: no write permission")
@@ -143,14 +134,6 @@ def _load_plan(folder: Path, settings: Settings) -> Plan:
         raise UsageError(f"{folder / PLAN_FILE}: {error}") from error
 
 
-def _kept_clock(names: Sequence[str]) -> str:
-    """A note about tests on hardware, which keep their own clock."""
-    if not names:
-        return ""
-    who = f"{names[0]} runs" if len(names) == 1 else f"{names[0]} and {len(names) - 1} more run"
-    return f"note: {who} in real time, because hardware does not wait\n"
-
-
 def compile_tests(
     options: argparse.Namespace, settings: Settings, folder: Path, stdout: TextIO, samples: int | None = None
 ) -> tuple[list[Plan], Deployment, dict[str, str]]:
@@ -164,8 +147,8 @@ def compile_tests(
     stdout.write(rigless)
     if not checked.specs:
         raise UsageError("no tests to run")
-    if settings.clock:
-        stdout.write(_kept_clock([s.title for s in checked.specs if s.level == "hil" and s.clock != settings.clock]))
+    kept = [s.title for s in checked.specs if s.level == "hil" and settings.clock not in (None, s.clock)]
+    stdout.write(f"note: {', '.join(kept)} in real time, because hardware does not wait\n" if kept else "")
     if not checked.ok:
         write_diagnostics(stdout, told_once(checked.diagnostics, SUFFIX))
         raise UsageError("the tests above cannot be compiled")

@@ -19,7 +19,6 @@ from dodo_dsl.cli import run as cli_run
 from dodo_dsl.cli.errors import UsageError, of_outcomes
 from dodo_dsl.cli.loading import loading
 from dodo_dsl.cli.provenance import origin
-from dodo_dsl.cli.run import reserved
 from dodo_dsl.cli.run_jobs import prepare
 from dodo_dsl.compiler import NoApplication
 from dodo_dsl.outcome import Outcome
@@ -138,10 +137,9 @@ class Watch:
             slugs = {job.plan.slug for job in jobs} - {job.plan.slug for job in chosen}
             others = [outcome for slug, outcome in self.outcomes.items() if slug in slugs]
             kept = GivenReport(BEFORE, others) if others else None
-            with reserved(self._options.report, self._stdout):
-                report, said = self._options.report, self._options.verbosity
-                source = origin(self._options, deployment)
-                outcomes, _, _ = cli_run.run(runner, chosen, report, self._stdout, source, kept, said)
+            report, said = self._options.report, self._options.verbosity
+            source = origin(self._options, deployment)
+            outcomes, _, _ = cli_run.run(runner, chosen, report, self._stdout, source, kept, said)
         self._show_change(outcomes)
         self.outcomes = {outcome.slug: outcome for outcome in [*others, *outcomes]}
         return runner.interrupted

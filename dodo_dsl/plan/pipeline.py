@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.plan.model import Plan, Suite
-from dodo_dsl.plan.runs import named, pooled
+from dodo_dsl.plan.model import Plan, Suite, named, pooled
 from dodo_dsl.spec.model import LEVELS
 from dodo_dsl.spec.rig import SIMULATION_TAG
 

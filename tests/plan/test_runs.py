@@ -2,9 +2,8 @@
 
 from dataclasses import replace
 
-from dodo_dsl.plan.model import Pooled
+from dodo_dsl.plan.model import Pooled, named, pooled, runs
 from dodo_dsl.plan.plan_json import from_json, to_json
-from dodo_dsl.plan.runs import named, pooled, runs
 from tests.plan.plans import BASE
 
 OTHER = replace(BASE, name="find", slug="find")
