@@ -1,15 +1,12 @@
-"""What editors complete and explain: the schema of specs with services and parameters.
+"""What editors complete and explain: services and their parameters in the schema of specs, for ``scripts/make-schema``.
 
-Only `$defs.use.allOf` and the `$defs` named `with-...` are generated. DoDo validates without the former, because its
-rules give better messages. ``scripts/make-schema`` writes the file. What schemas say of keys is that of tests and of
-``dodo.yml``.
+Only `$defs.use.allOf` and the `$defs` named `with-...` are generated. DoDo validates without them, because its rules
+give better messages.
 """
 
 import json
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from dodo_dsl import atomic, package_data
@@ -18,16 +15,17 @@ from dodo_dsl.spec.manifest import Manifest, Parameter, in_words, load_manifests
 
 Schema = dict[str, Any]
 
+FILE = package_data.schemas() / "dodo.schema.json"
 PREFIX = "with-"
-_NUMBER = r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?"
+_NUMBER = r"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?"
 _REFERENCE = r"\$\{(matrix|vary)\."
 _PLACEHOLDER: Schema = {"type": "string", "pattern": _REFERENCE}
-_TEXT: Schema = {"type": "string"}
-
-
-def schema_path() -> Path:
-    """The schema's file."""
-    return package_data.schemas() / "dodo.schema.json"
+_QUANTITY: Schema = {"type": "string", "pattern": rf"{_NUMBER}\s*[A-Za-z%°µ][A-Za-z0-9%/]*\s*$|{_REFERENCE}"}
+_SIMPLE: dict[str, Schema] = {
+    "boolean": {"anyOf": [{"type": "boolean"}, _PLACEHOLDER]},
+    "amount": {"anyOf": [{"type": "number"}, _QUANTITY]},
+    "string": {"type": ["string", "number", "boolean"]},
+}
 
 
 def generate(text: str, manifests: Mapping[str, Manifest]) -> str:
@@ -66,31 +64,29 @@ def _with(manifest: Manifest) -> Schema:
 
 
 def _parameter(parameter: Parameter) -> Schema:
-    schema: Schema = {"description": description(parameter), **_value(parameter)}
+    schema: Schema = {"description": _description(parameter), **_value(parameter)}
     if parameter.default not in (None, []):
-        schema["default"] = written(parameter, parameter.default)
+        schema["default"] = _written(parameter, parameter.default)
     elif parameter.example is not None:
-        schema["examples"] = [written(parameter, parameter.example)]
+        schema["examples"] = [_written(parameter, parameter.example)]
     elif parameter.unit:
-        schema["examples"] = [written(parameter, 1)]
+        schema["examples"] = [_written(parameter, 1)]
     return schema
 
 
-def description(parameter: Parameter) -> str:
+def _description(parameter: Parameter) -> str:
     """What a parameter is for, its range, and who else may give it."""
     facts = [parameter.help]
     if bounds := parameter.bounds:
         facts.append(f"A{bounds[1:]}." if bounds.startswith("at") else f"From {bounds}.")
     if parameter.required and not parameter.rig and not parameter.shared:
         facts.append("Required.")
-    if parameter.when:
-        facts.append(f"Only {in_words(parameter.when)}.")
-    if parameter.rig:
-        facts.append(f"Defaults to the rig's {parameter.rig}.")
+    facts += [f"Only {in_words(parameter.when)}."] if parameter.when else []
+    facts += [f"Defaults to the rig's {parameter.rig}."] if parameter.rig else []
     return " ".join(facts)
 
 
-def written(parameter: Parameter, value: Any) -> Any:
+def _written(parameter: Parameter, value: Any) -> Any:
     """A value as an author writes it."""
     bare = parameter.unit in ("", quantity.SHARE)
     if parameter.of and isinstance(value, list):
@@ -104,50 +100,23 @@ def _value(parameter: Parameter) -> Schema:
         return {"anyOf": [{"enum": list(parameter.choices)}, _PLACEHOLDER]}
     if parameter.type in ("number", "integer"):
         return _number(parameter)
-    if parameter.type == "boolean":
-        return {"anyOf": [{"type": "boolean"}, _PLACEHOLDER]}
     if parameter.type == "list":
         if not parameter.of:
-            return {"type": ["array", "string"], "items": _TEXT}
+            return {"type": ["array", "string"], "items": {"type": "string"}}
         item = _number(replace(parameter, type=parameter.of))
         return {"anyOf": [{"type": "array", "items": item}, item]}
-    if parameter.type == "amount":
-        return {
-            "anyOf": [
-                {"type": "number"},
-                {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*[A-Za-z0-9%/]+\s*$"},
-                _PLACEHOLDER,
-            ]
-        }
-    if parameter.type == "string":
-        return {"type": ["string", "number", "boolean"]}
-    return dict(_TEXT)
+    return _SIMPLE.get(parameter.type, {"type": "string"})
 
 
 def _number(parameter: Parameter) -> Schema:
     if parameter.unit not in ("", quantity.SHARE):
-        units = "|".join(re.escape(u) for u in quantity.UNITS if _converts(u, parameter.unit))
-        pattern = rf"^\s*{_NUMBER}\s*({units})\s*$|{_REFERENCE}"
-        return {"type": "string", "pattern": pattern, "patternErrorMessage": f"expected a quantity in {parameter.unit}"}
+        return {**_QUANTITY, "patternErrorMessage": f"expected a quantity in {parameter.unit}"}
     bounds = {"minimum": parameter.minimum, "maximum": parameter.maximum}
     number: Schema = {"type": parameter.type, **{k: v for k, v in bounds.items() if v is not None}}
-    percent = [{"type": "string", "pattern": rf"^\s*{_NUMBER}\s*%\s*$"}] if parameter.unit else []
+    percent = [{"type": "string", "pattern": rf"{_NUMBER}\s*%\s*$"}] if parameter.unit else []
     return {"anyOf": [number, *percent, _PLACEHOLDER]}
 
 
-def _converts(written: str, unit: str) -> bool:
-    try:
-        quantity.convert(f"1 {written}", unit)
-    except quantity.QuantityError:
-        return False
-    return True
-
-
-def write(file: Path | None = None) -> None:
+def write() -> None:
     """Generates the schema's file from the shipped services."""
-    target = file or schema_path()
-    atomic.write_text(target, generate(target.read_text(encoding="utf-8"), load_manifests()[0]))
-
-
-if __name__ == "__main__":
-    write()
+    atomic.write_text(FILE, generate(FILE.read_text(encoding="utf-8"), load_manifests()[0]))
