@@ -163,8 +163,7 @@ def load(
     """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any.
 
     ``application`` are compose files that replace the deployment's, which is looked for at ``start``, then above the
-    tests. With ``services_only`` no test is read, and where
-    all ``names`` are those of files, no other is.
+    tests. With ``services_only`` no test is read, and where all ``names`` are those of files, no other is.
     """
     deployment, found = load_deployment(find_deployment(start or Path.cwd(), paths))
     manifests, manifest_problems = load_manifests(deployment.services)

@@ -6,7 +6,7 @@ import hashlib
 import os
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -84,27 +84,6 @@ def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
 def ordered(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
     """Sorted by position, each once."""
     return sorted(set(diagnostics))
-
-
-def told_once(diagnostics: Iterable[Diagnostic], suffix: str) -> list[Diagnostic]:
-    """The same, but a warning that the files of several tests have is at the first, with the names of all of them.
-
-    These are the names of the files without their ``suffix``.
-    """
-    groups: dict[tuple[str, ...], list[Diagnostic]] = {}
-    for d in diagnostics:
-        of_test = d.severity == "warning" and d.span.file.endswith(suffix)
-        place = () if of_test else (str(len(groups)),)
-        groups.setdefault((d.rule, d.message, d.hint, *place), []).append(d)
-    return [one for group in groups.values() for one in _first_of(group, suffix)]
-
-
-def _first_of(group: Sequence[Diagnostic], suffix: str) -> Sequence[Diagnostic]:
-    files = list(dict.fromkeys(d.span.file for d in group))
-    if len(files) == 1:
-        return group
-    names = [name for d in group for name in d.tests or (Path(d.span.file).name.removesuffix(suffix),)]
-    return [replace(group[0], tests=tuple(dict.fromkeys(names)))]
 
 
 def closest(word: str, known: Iterable[str]) -> list[str]:

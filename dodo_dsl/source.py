@@ -27,8 +27,6 @@ _INT = re.compile(r"[-+]?[0-9]{1,300}\Z|0o[0-7]{1,300}\Z|0x[0-9a-fA-F]{1,300}\Z"
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?\Z")
 _DASHES = re.compile(r"-[^-\s]\S*(\s+- ?[^-\s]\S*)+")
 """Items of a list that would be one text."""
-_NAME = re.compile(r"(matrix|vary)\.[a-z][a-z0-9-]*")
-"""What a placeholder names."""
 _SECOND = "remove the line, or write what stands below into its own file"
 _SPECIAL: dict[str, Plain] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
@@ -260,11 +258,8 @@ class _Builder:
     def _as_key(self, node: Node, span: Span) -> Scalar:
         if isinstance(node, Scalar):
             return node
-        message, hint = "this key is a list or a mapping, expected a string", "remove the '?' or the brackets"
-        if isinstance(node, Mapping) and len(node.entries) == 1 and (name := _NAME.fullmatch(next(iter(node.entries)))):
-            message = f"'{{{{ {name[0]} }}}}' is not a placeholder, and braces mean something else in YAML"
-            hint = f'write "${{{name[0]}}}"'
-        raise _Stop(span, "yaml-syntax", message, hint)
+        message = "this key is a list or a mapping, expected a string"
+        raise _Stop(span, "yaml-syntax", message, "remove the '?' or the brackets; a placeholder is \"${matrix.x}\"")
 
     def _entry(self, top: _Open, key: Scalar, node: Node) -> None:
         if key.text == "<<" and key.value == "<<":

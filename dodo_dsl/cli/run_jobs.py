@@ -14,7 +14,7 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.display import write_diagnostics
 from dodo_dsl.cli.errors import UsageError, require_extra
 from dodo_dsl.compiler import Checked, narrowed, plan
-from dodo_dsl.diagnostics import has_errors, ordered, told_once
+from dodo_dsl.diagnostics import has_errors, ordered
 from dodo_dsl.emit.output_folder import write
 from dodo_dsl.emit.render import PLAN_FILE
 from dodo_dsl.opendlv import regular_file
@@ -27,7 +27,6 @@ from dodo_dsl.search.space import space_of, sweep
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.model import CLOCKS
-from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.spec.rig import SIMULATION_TAG
 from dodo_dsl.spec.vary import Values
 from dodo_dsl.terminal import printable
@@ -150,14 +149,14 @@ def compile_tests(
     kept = [s.title for s in checked.specs if s.level == "hil" and settings.clock not in (None, s.clock)]
     stdout.write(f"note: {', '.join(kept)} in real time, because hardware does not wait\n" if kept else "")
     if not checked.ok:
-        write_diagnostics(stdout, told_once(checked.diagnostics, SUFFIX))
+        write_diagnostics(stdout, checked.diagnostics)
         raise UsageError("the tests above cannot be compiled")
     tests: dict[str, str] = {}
     if samples:
         checked, tests = sample(checked, samples)
     made = plan(checked, folder)
     problems = ordered([*checked.diagnostics, *made.problems])
-    write_diagnostics(stdout, told_once(problems, SUFFIX))
+    write_diagnostics(stdout, problems)
     if has_errors(problems):
         raise UsageError("the tests above cannot be compiled")
     write(made.compiled, made.pipeline, folder)

@@ -17,7 +17,7 @@ from dodo_dsl.cli.numbers import positive, seed
 from dodo_dsl.cli.progress import NoProgress
 from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors
-from dodo_dsl.diagnostics import has_errors, ordered, told_once
+from dodo_dsl.diagnostics import has_errors, ordered
 from dodo_dsl.run.backends import CombinedBackends
 from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
@@ -27,7 +27,7 @@ from dodo_dsl.search.study import Study
 from dodo_dsl.spec.load import Settings
 from dodo_dsl.spec.model import LOCKSTEP
 from dodo_dsl.spec.registry import SUFFIX
-from dodo_dsl.terminal import printable
+from dodo_dsl.terminal import printable, unescaped
 
 INTERRUPTED = "interrupted: the same command goes on from here\n"
 
@@ -63,7 +63,7 @@ class SearchSession:
         """The tests at their nominal values, with their problems shown; raises UsageError if some are errors."""
         made = compiler.plan(checked, checked.deployment.root / "nominal") if checked.ok else None
         problems = ordered([*checked.diagnostics, *(made.problems if made else ())])
-        write_diagnostics(self.stdout, told_once(problems, SUFFIX))
+        write_diagnostics(self.stdout, problems)
         if made is None or has_errors(problems):
             raise UsageError("the above cannot be compiled")
         return made

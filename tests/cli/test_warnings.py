@@ -1,19 +1,14 @@
 """What is said about a test that runs: its own problems and warnings, and not those of others."""
 
 import json
-from argparse import Namespace
 from collections.abc import Iterable
-from io import StringIO
 from pathlib import Path
-from typing import Literal
 
 import pytest
 
-from dodo_dsl.cli.run_jobs import compile_tests
 from dodo_dsl.cli.selection import select
 from dodo_dsl.compiler import Checked
-from dodo_dsl.diagnostics import Diagnostic, Span, format_gitlab, format_json, format_text, has_errors, told_once
-from dodo_dsl.spec.load import Settings
+from dodo_dsl.diagnostics import Diagnostic, Span, format_gitlab, format_json, format_text, has_errors
 from tests.check import examples
 
 GOOD = """\
@@ -138,26 +133,3 @@ def test_one_warning_of_several_tests_is_shown_once_with_their_names_or_number(t
     (as_json,), (as_report,) = json.loads(format_json(found)), json.loads(format_gitlab(found))
     assert (as_json["tests"], as_report["description"]) == (tests, said)
     assert as_report["fingerprint"] == json.loads(format_gitlab([_of([])]))[0]["fingerprint"]
-
-
-def test_the_same_warning_in_the_files_of_several_tests_is_shown_once() -> None:
-    def warning(file: str, line: int = 7, severity: Literal["error", "warning"] = "warning") -> Diagnostic:
-        return Diagnostic(Span(f"tests/{file}", line), "clock-timed", "no message", severity=severity)
-
-    same = [warning(f"{name}.dodo.yml", line) for line, name in enumerate("abcd", 1)]
-    other = [warning("c.json"), warning("d.json"), warning("a.dodo.yml", 9, "error"), warning("b.dodo.yml", 9, "error")]
-    first, *rest = told_once([*same, *other], ".dodo.yml")
-    assert (first.span, first.sentence) == (same[0].span, "no message (in 4 tests, such as a)")
-    assert rest == other
-    assert told_once([warning("a.dodo.yml", 1), warning("a.dodo.yml", 2)], ".dodo.yml")[0].tests == ()
-
-
-def test_a_run_shows_a_warning_of_two_tests_once(repository: Path) -> None:
-    for name in ("good", "better"):
-        (repository / f"tests/{name}/{name}.dodo.yml").write_text(_test(name).replace("20 Hz]", "20 Hz], x: [1, 2]"))
-    said, words = StringIO(), Namespace(test=["good", "better"], level=[], application=[], backend="docker")
-    compile_tests(words, Settings(), repository / "out", said)
-    assert [line for line in said.getvalue().splitlines() if "matrix-unused" in line] == [
-        "tests/better/better.dodo.yml:7:32: warning[matrix-unused]: nothing uses ${matrix.x}, so that its"
-        " values change nothing (in better and good)"
-    ]
