@@ -43,7 +43,7 @@ STARTS = {
     ("sil", "perception"): "sil-perception",
     ("dil", "open-loop"): "dil-kiwi-track",
     ("dil", "perception"): "dil-static-rig",
-    ("hil", "closed-loop"): "",
+    ("hil", "closed-loop"): "hil-dynamic",
     ("hil", "open-loop"): "hil-open-straight",
     ("hil", "perception"): "hil-camera",
 }
@@ -134,9 +134,11 @@ def _application(options: argparse.Namespace, stdout: TextIO) -> int:
     if there := compose_file(root):
         raise UsageError(f"'{there}' exists already; nothing was written; name it in {FILE_NAME}: application: {there}")
     kind = "ros" if options.ros else options.language or "python"
-    files = {FILE_NAME: _dodo_yml(root, COMPOSE_FILES[0])}
-    values = {"base": f"dodo/vision:{__version__}", "process": "python" if has_ros else ".ros/bin/python"}
-    files |= filled_folder(kind, root, **values)
+    python = ".ros/bin/python" if kind == "ros" and not has_ros else "python"
+    process = "build/steering" if kind == "cpp" else f"{python}, steering.py"
+    compose = New(root / COMPOSE_FILES[0], filled(COMPOSE_FILES[0], process=process))
+    files = {FILE_NAME: _dodo_yml(root, COMPOSE_FILES[0]), COMPOSE_FILES[0]: compose}
+    files |= filled_folder(kind, root, base=f"dodo/vision:{__version__}", process=process)
     test = f"{REGISTRY}/{_FIRST}/{_FIRST}{SUFFIX}"
     if test not in files:
         files[test] = New(root / test, filled(f"tests/{LEVEL}-{KIND}{SUFFIX}", name=_FIRST, pictures=""))
@@ -302,8 +304,7 @@ def _files(
     level, kind = options.level or LEVEL, options.kind or KIND
     if base := options.extends or STARTS[level, kind]:
         return _from_another(options.name, base, checked, shipped, registry, root)
-    service = "camera" if level == "hil" else "virtual-camera"
-    lines = "".join(f"      {key}: {value}\n" for key, value in pictures.parameters(service).items())
+    lines = "".join(f"      {key}: {value}\n" for key, value in pictures.parameters("virtual-camera").items())
     text = filled(f"tests/{level}-{kind}{SUFFIX}", name=options.name, pictures=lines)
     files = [*spec_files(options.name, registry / options.name, root, text), *world_files(text, registry)]
     return files, pictures.note

@@ -23,7 +23,6 @@ from dodo_dsl.spec.registry import SUFFIX
 SCHEMAS = ("deployment.schema.json", "application.schema.json", "dodo.schema.json")
 SCHEMA_FOLDERS = (".dodo", "schemas")
 """Where a repository may have the schemas for editors: the first is where ``dodo new`` writes them."""
-_MAPS = ("straight", "rig-straight")
 _TARGET = "targets/weave.csv"
 
 
@@ -69,9 +68,8 @@ def spec_files(name: str, folder: Path, root: Path, text: bytes) -> list[New]:
 def world_files(text: bytes, registry: Path) -> list[New]:
     """The map and the target of a template's test, where the registry has none."""
     files = []
-    for name in _MAPS:
-        if re.search(rf"\.\./maps/{name}\b(?!-)".encode(), text) and not (registry / "maps" / name).exists():
-            files += map_files(name, registry / "maps" / name)
+    if not (registry / "maps/straight").exists():
+        files += map_files("straight", registry / "maps/straight")
     if f"../{_TARGET}".encode() in text and not (registry / _TARGET).exists():
         files.append(New(registry / _TARGET, filled("tests/weave.csv")))
     return files

@@ -44,7 +44,7 @@ def test_a_shipped_test_that_the_deployment_leaves_out(repository: Path, word: s
 @pytest.mark.thorough
 def test_problems_of_the_deployment_come_before_names_that_it_may_have(repository: Path) -> None:
     deployment(repository, "tests, dodo:")
-    with pytest.raises(UsageError, match=r"yaml-syntax(?s:.*)hint: remove it, or write the text in quotes"):
+    with pytest.raises(UsageError, match=r"yaml-syntax(?s:.*)hint: look at brackets, quotes"):
         select(["my-test"], (), ())
 
 
