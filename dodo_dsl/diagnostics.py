@@ -5,7 +5,7 @@ import functools
 import hashlib
 import os
 import re
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -35,21 +35,9 @@ class Span:
     length: int = 1
 
 
-@dataclass(frozen=True)
-class Fix:
-    """What to write in place of ``old``, which the text at the diagnostic's span has once."""
-
-    old: str
-    new: str
-
-    def mended(self, text: str) -> str:
-        """The text at the span with the fix; as it is if it has changed meanwhile."""
-        return text.replace(self.old, self.new) if text.count(self.old) == 1 else text
-
-
 @dataclass(frozen=True, order=True)
 class Diagnostic:
-    """One problem; ``rule`` is its name in the rule catalogue. It has a ``fix`` if there is exactly one.
+    """One problem; ``rule`` is its name in the rule catalogue.
 
     ``tests`` are those that it depends on, where its position does not say so.
     """
@@ -59,7 +47,6 @@ class Diagnostic:
     message: str
     hint: str = ""
     severity: Severity = "error"
-    fix: Fix | None = field(default=None, compare=False)
     tests: tuple[str, ...] = field(default=(), compare=False)
 
     @property
@@ -108,12 +95,6 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     if 0 < len(choices) <= 12:
         return "known: " + ", ".join(choices)
     return ""
-
-
-def only_fix(word: str, known: Iterable[str], taken: Collection[str] = ()) -> Fix | None:
-    """The known word that is meant, if it is the only one that is near and is not there already."""
-    close = closest(word, known)
-    return Fix(word, close[0]) if len(close) == 1 and close[0] not in taken else None
 
 
 def shown_path(file: str) -> str:

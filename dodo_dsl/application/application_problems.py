@@ -21,7 +21,7 @@ from dodo_dsl.application.model import (
     words_of,
 )
 from dodo_dsl.application.variables import variables_of
-from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix, shown_path
+from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, shown_path
 from dodo_dsl.source import Node
 
 _HIGHEST = 254
@@ -138,9 +138,9 @@ def unknown_keys(service: Node) -> Iterator[Diagnostic]:
     for word, entry in entries.items():
         is_near = word.startswith("x-") and difflib.get_close_matches(word.lower(), KEYS, cutoff=0.8)
         if word not in KEYS and (word.startswith("x-dodo") or is_near):
-            hint, fix = did_you_mean(word, KEYS), only_fix(word, KEYS, entries)
+            hint = did_you_mean(word, KEYS)
             severity: Severity = "error" if word.startswith("x-dodo") else "warning"
-            yield Diagnostic(entry.key, "unknown-key", f"unknown key '{word}'", hint, severity, fix=fix)
+            yield Diagnostic(entry.key, "unknown-key", f"unknown key '{word}'", hint, severity)
 
 
 def _name(service: ComposeService) -> Iterator[Diagnostic]:

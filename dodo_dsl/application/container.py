@@ -5,7 +5,7 @@ them; those without which something else would run are refused.
 """
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
@@ -25,7 +25,7 @@ from dodo_dsl.application.model import (
 from dodo_dsl.application.mounts import mounts
 from dodo_dsl.application.part import OFF, Part, is_set
 from dodo_dsl.application.variables import variables_with_cid
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed
 from dodo_dsl.source import Node, Scalar
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class Container(Part):
         node = self.service.raw.get(key)
         return None if node is None else plain(filled_node(node, self.known, self.project.application.is_late))
 
-    def other(self, key: str, name: str, span: Span, taken: Collection[str] = ()) -> str:
+    def other(self, key: str, name: str, span: Span) -> str:
         """A service that a key names, if it starts; a problem if there is none, as of a container of others."""
         others = self.project.application.services
         if name.startswith("container:"):
@@ -88,8 +88,7 @@ class Container(Part):
             self.refuse(span, message, "make it a service of the application")
         elif name not in others and name not in self.project.application.dropped:
             message = f"'{key}' of '{self.name}' names the unknown service '{name}'"
-            fix = only_fix(name, others, (self.name, *(taken or [name])))
-            self.bad(span, message, did_you_mean(name, others), fix)
+            self.bad(span, message, did_you_mean(name, others))
         return name if name in others else ""
 
 
@@ -201,7 +200,7 @@ def _depends_on(c: Container, node: Node) -> Any:
         if own.get("required") is False:
             is_there = name in c.project.application.services
         else:
-            is_there = bool(c.other("depends_on", name, entry.key, services))
+            is_there = bool(c.other("depends_on", name, entry.key))
         made.update({name: own or {"condition": _CONDITIONS[0]}} if is_there else {})
     return made
 

@@ -12,7 +12,7 @@ from dodo_dsl.application.interpolation import escaped
 from dodo_dsl.application.limits import capped, is_kept, size
 from dodo_dsl.application.merge import is_path
 from dodo_dsl.application.model import is_true, plain
-from dodo_dsl.diagnostics import Fix, Span, did_you_mean, only_fix
+from dodo_dsl.diagnostics import Span, did_you_mean
 from dodo_dsl.source import Mapping, Node, Scalar
 
 if TYPE_CHECKING:
@@ -117,9 +117,7 @@ def _carried(of: "Container", mount: Mount) -> Mount | None:
         hint = did_you_mean(mount.source, known)
         hint = hint if hint.startswith("did") else f"declare it at the end of the file: 'volumes: {{{mount.source}: }}'"
         message = f"'{of.name}' mounts the volume '{mount.source}', which the top-level 'volumes' do not declare"
-        near = only_fix(mount.source, known)
-        is_short = near is not None and mount.span.length > len(mount.source)
-        of.bad(mount.span, message, hint, fix=Fix(f"{near.old}:/", f"{near.new}:/") if near and is_short else near)
+        of.bad(mount.span, message, hint)
         return None
     if mount.kind != "volume" or not mount.source:
         return mount

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from dodo_dsl import source
 from dodo_dsl.application.interpolation import escaped, literal
 from dodo_dsl.application.model import plain, text
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
 from dodo_dsl.source import Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
@@ -38,8 +38,8 @@ class Part:
     def add(self, problem: Diagnostic) -> None:
         self.problems.append(problem)
 
-    def bad(self, span: Span, message: str, hint: str = "", fix: Fix | None = None) -> None:
-        self.add(Diagnostic(span, "application-file", message, hint, fix=fix))
+    def bad(self, span: Span, message: str, hint: str = "") -> None:
+        self.add(Diagnostic(span, "application-file", message, hint))
 
     def refuse(self, span: Span, message: str, hint: str) -> None:
         """Access to the host that tests would share."""
@@ -58,10 +58,9 @@ class Part:
     def unknown_key(self, key: str, of: source.Mapping, where: str, known: Collection[str], hint: str = "") -> None:
         """A key of a mapping that compose has not; one with x- is somebody's own."""
         if not key.startswith("x-"):
-            fix = None if hint else only_fix(key, known, of.entries)
             hint = hint or did_you_mean(key, known) or ASK_KEY.format(key)
             message = f"unknown key '{key}' in {where}"
-            self.add(Diagnostic(of.entries[key].key, "unknown-key", message, hint, fix=fix))
+            self.add(Diagnostic(of.entries[key].key, "unknown-key", message, hint))
 
     def literal(self, node: Node) -> str | None:
         """A text that is known when the test is compiled; None for any other, with a problem."""

@@ -34,7 +34,7 @@ from dodo_dsl.application.model import (
 )
 from dodo_dsl.application.ros_topics import BRIDGE, bridge
 from dodo_dsl.application.variables import tunable_problems, with_values
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, entries
 from dodo_dsl.spec.deployment import Declarations
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -185,9 +185,8 @@ def _declaration_problems(
     named += [(name, entry.key) for name, entry in declarations.services.items()]
     for name, span in named:
         if name not in services:
-            fix = only_fix(name, services, [name for name, _ in named])
             hint = did_you_mean(name, services)
-            yield Diagnostic(span, "application-file", f"the application has no service '{name}'", hint, fix=fix)
+            yield Diagnostic(span, "application-file", f"the application has no service '{name}'", hint)
     if gone and gone.keys() == services.keys():
         message = "'without' leaves out every service of the application, so that a test has nothing to start"
         hint = "name a compose file that has the service of your program under 'files'"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dodo_dsl.check import wiring
 from dodo_dsl.check.resolve import IMAGE, RuleContext, known_ids, without_pictures
-from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.assets import formats, map_file, recording_contents
 from dodo_dsl.opendlv.assets.problem import InputError
@@ -142,7 +142,7 @@ def _among(context: RuleContext, service: ResolvedService, argument: Argument, e
         if isinstance(item, Scalar) and item.text not in names:
             of = " and ".join(_PLURAL.get(key, key) for key in keys)
             message, hint = f"'{item.text}' is not among the {of} of {shown}", did_you_mean(item.text, names)
-            yield Diagnostic(item.span, "unknown-name", message, hint, fix=only_fix(item.text, names))
+            yield Diagnostic(item.span, "unknown-name", message, hint)
 
 
 @functools.lru_cache(maxsize=256)

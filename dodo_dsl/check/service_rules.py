@@ -9,7 +9,7 @@ from dodo_dsl.application.model import PrintedLine
 from dodo_dsl.check import resolve
 from dodo_dsl.check.resolve import RuleContext
 from dodo_dsl.check.senders import is_shipped, told
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
 from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Scalar, Sequence, read, walk
 from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService
@@ -26,8 +26,8 @@ def check_services(context: RuleContext) -> Iterator[Diagnostic]:
                 yield Diagnostic(use.uses.span, "wrong-layer", message, f"move it to {' or '.join(manifest.layers)}")
         else:
             hint = did_you_mean(use.uses.text, context.manifests) or "'dodo list --services' shows those that there are"
-            message, fix = f"unknown service '{use.uses.text}'", only_fix(use.uses.text, context.manifests)
-            yield Diagnostic(use.uses.span, "unknown-service", message, hint, fix=fix)
+            message = f"unknown service '{use.uses.text}'"
+            yield Diagnostic(use.uses.span, "unknown-service", message, hint)
         if use.name == "sandbox" or use.name.startswith("dodo-"):
             message = f"the name '{use.name}' is reserved for DoDo's own services"
             hint = "choose another name; 'sandbox' and 'dodo-...' are reserved"
@@ -66,9 +66,9 @@ def _written(service: ResolvedService) -> Iterator[Diagnostic]:
         argument = service.arguments.get(name)
         if argument is None:
             known = service.manifest.parameters
-            slip, hint, fix = unknown_key(name, known, service.use.parameters)
+            slip, hint = unknown_key(name, known)
             message = slip or f"service '{service.manifest.name}' has no parameter '{name}'"
-            yield Diagnostic(entry.key, "unknown-parameter", message, hint, fix=fix)
+            yield Diagnostic(entry.key, "unknown-parameter", message, hint)
         elif argument.problem:
             yield argument.problem
         elif not holds(argument.parameter.when, service.texts):
@@ -183,8 +183,7 @@ def unknown_message(name: str, known: Collection[str], span: Span) -> Iterator[D
     """The problem of a name that is none of the ``known`` messages."""
     if name and name not in known:
         hint = did_you_mean(name, known) or "add the files of your own messages under 'messages' in dodo.yml"
-        fix = only_fix(name, known)
-        yield Diagnostic(span, "unknown-message", f"unknown message '{name[:80]}'", hint, fix=fix)
+        yield Diagnostic(span, "unknown-message", f"unknown message '{name[:80]}'", hint)
 
 
 _MESSAGE = re.compile(r"[\w.]+")

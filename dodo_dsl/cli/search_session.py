@@ -26,8 +26,7 @@ from dodo_dsl.search.store import Store
 from dodo_dsl.search.study import Study
 from dodo_dsl.spec.load import Settings
 from dodo_dsl.spec.model import LOCKSTEP
-from dodo_dsl.spec.registry import SUFFIX
-from dodo_dsl.terminal import printable, unescaped
+from dodo_dsl.terminal import printable
 
 INTERRUPTED = "interrupted: the same command goes on from here\n"
 

@@ -9,7 +9,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Literal
 
-from dodo_dsl.diagnostics import Diagnostic, Fix, did_you_mean, only_fix
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.opendlv.assets import map_file
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, path_of, walk
 from dodo_dsl.spec import quantity
@@ -50,12 +50,10 @@ class Value:
 class ValueProblem(Exception):
     """A written value does not fit its parameter."""
 
-    def __init__(
-        self, parameter: Parameter, node: Node, rule: str, text: str, hint: str = "", fix: Fix | None = None
-    ) -> None:
+    def __init__(self, parameter: Parameter, node: Node, rule: str, text: str, hint: str = "") -> None:
         message = f"parameter '{parameter.name}'{text}"
         super().__init__(message)
-        self.diagnostic = Diagnostic(node.span, rule, message, hint, fix=fix)
+        self.diagnostic = Diagnostic(node.span, rule, message, hint)
 
 
 def convert(parameter: Parameter, node: Node, root: Path) -> Value:
@@ -97,7 +95,7 @@ def _number(parameter: Parameter, node: Node, _: Path) -> Value:
         else:  # in the base unit of its dimension
             number = quantity.in_base_unit(scalar.text)
     except quantity.QuantityError as error:
-        raise ValueProblem(parameter, node, "wrong-unit", f": {error}", error.hint, error.fix) from error
+        raise ValueProblem(parameter, node, "wrong-unit", f": {error}", error.hint) from error
     return _bounded(parameter, scalar, number)
 
 
@@ -135,8 +133,7 @@ def _text(parameter: Parameter, node: Node, _: Path) -> Value:
         raise ValueProblem(parameter, node, rule, f" is '{scalar.text[:60]}', expected {expected}")
     if parameter.choices and scalar.text not in parameter.choices:
         text = f" is '{scalar.text}', expected one of {', '.join(parameter.choices)}"
-        hint, fix = did_you_mean(scalar.text, parameter.choices), only_fix(scalar.text, parameter.choices)
-        raise ValueProblem(parameter, node, "wrong-value", text, hint, fix)
+        raise ValueProblem(parameter, node, "wrong-value", text, did_you_mean(scalar.text, parameter.choices))
     return Value(scalar.text, "memory" if parameter.type == "memory" else "text")
 
 
@@ -144,7 +141,7 @@ def _boolean(parameter: Parameter, node: Node, _: Path) -> Value:
     scalar = _scalar(parameter, node, "true or false")
     if not isinstance(scalar.value, bool):
         text = f" is '{scalar.text}', expected true or false"
-        raise ValueProblem(parameter, node, "wrong-type", text, *boolean_meant(scalar.text))
+        raise ValueProblem(parameter, node, "wrong-type", text, boolean_meant(scalar.text))
     return Value("true" if scalar.value else "false")
 
 

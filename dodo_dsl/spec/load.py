@@ -153,10 +153,10 @@ def _problem(written: Scalar, path: Path, chain: tuple[Path, ...], root: Path) -
         return Diagnostic(written.span, "extends-file", f"'{written.text}' is a folder, expected a test's file", hint)
     if not path.is_file():
         message = f"there is no file '{written.text}' to extend"
-        hint, fix = near_path(written.text, chain[-1].parent, root, lambda near: near.is_file() and near not in chain)
+        hint = near_path(written.text, chain[-1].parent, root, lambda near: near.is_file() and near not in chain)
         if written.text.startswith(SHIPPED):
-            hint, fix = "'dodo new NAME --extends TEST' copies a test that ships with DoDo", None
-        return Diagnostic(written.span, "extends-file", message, hint, fix=fix)
+            hint = "'dodo new NAME --extends TEST' copies a test that ships with DoDo"
+        return Diagnostic(written.span, "extends-file", message, hint)
     return None
 
 

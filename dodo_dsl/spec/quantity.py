@@ -3,7 +3,7 @@
 import re
 from decimal import Decimal, InvalidOperation, localcontext
 
-from dodo_dsl.diagnostics import Fix, did_you_mean, only_fix
+from dodo_dsl.diagnostics import did_you_mean
 
 SHARE = "1"
 """The unit of shares, which need none: 0.5 is 50 %."""
@@ -46,12 +46,11 @@ _SHARES = "write for example 0.5 or 50 %"
 
 
 class QuantityError(ValueError):
-    """A value is not a quantity in the expected unit; ``hint`` suggests one, ``fix`` is the only one."""
+    """A value is not a quantity in the expected unit; ``hint`` suggests one."""
 
-    def __init__(self, message: str, hint: str = "", fix: Fix | None = None) -> None:
+    def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message)
         self.hint = hint
-        self.fix = fix
 
 
 def _a(noun: str) -> str:
@@ -80,7 +79,7 @@ def convert(value: object, unit: str) -> Decimal:
     if not written:
         raise QuantityError(f"'{text}' has no unit, expected {_a(_DIMENSION[unit])} in {unit}", _example(text, unit))
     if written not in _DIMENSION:
-        raise QuantityError(f"unknown unit '{written}'", did_you_mean(written, siblings), only_fix(written, siblings))
+        raise QuantityError(f"unknown unit '{written}'", did_you_mean(written, siblings))
     if written not in siblings:
         message = f"'{text}' is {_a(_DIMENSION[written])}, expected {_a(_DIMENSION[unit])} in {unit}"
         raise QuantityError(message, _example(match["number"], unit))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dodo_dsl.diagnostics import Fix, closest, shown_path
+from dodo_dsl.diagnostics import closest, shown_path
 from dodo_dsl.source import resolve
 
 SUFFIX = ".dodo.yml"
@@ -136,9 +136,7 @@ def is_free(text: str) -> bool:
     return is_name(text) and text not in KEYWORDS and resolve(text) == text
 
 
-def near_path(
-    text: str, folder: Path, root: Path, fits: Callable[[Path], bool] = Path.exists
-) -> tuple[str, Fix | None]:
+def near_path(text: str, folder: Path, root: Path, fits: Callable[[Path], bool] = Path.exists) -> str:
     """A hint about a path from a folder that leads nowhere: where DoDo looked, and a path like it that ``fits``.
 
     That is within ``root``: of a like name beside it, the test of its name, or the same from a folder above.
@@ -152,5 +150,5 @@ def near_path(
     for path in (each.resolve() for each in (*found, folder / ".." / text, folder / "../.." / text)):
         if fits(path) and path.is_relative_to(root.resolve()):
             near = Path(os.path.relpath(path, folder)).as_posix()
-            return f"{hint}; did you mean '{near}'?", Fix(text, near)
-    return hint, None
+            return f"{hint}; did you mean '{near}'?"
+    return hint

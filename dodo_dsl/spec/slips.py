@@ -7,29 +7,29 @@ from typing import Any
 
 import yaml
 
-from dodo_dsl.diagnostics import Fix, closest, did_you_mean, only_fix
+from dodo_dsl.diagnostics import closest, did_you_mean
 from dodo_dsl.source import Entry, entries
 
 _WORDS = {"yes": "true", "y": "true", "on": "true", "no": "false", "n": "false", "off": "false"}
 _CLOSING = {"{": "}", "[": "]"}
 
 
-def boolean_meant(text: str) -> tuple[str, Fix | None]:
-    """A hint for a word that other readers of YAML take for true or false, and the fix; empty and None for others."""
+def boolean_meant(text: str) -> str:
+    """A hint for a word that other readers of YAML take for true or false; empty for others."""
     meant = _WORDS.get(text.lower(), "")
-    return (f"write {meant}", Fix(text, meant)) if meant else ("", None)
+    return f"write {meant}" if meant else ""
 
 
 _SPACE_MISSING = re.compile(r"(?P<key>[^:\s]+):(?P<value>.*\S.*)", re.DOTALL)
 """A key in text that is YAML nonetheless, as ``{uses:camera}`` is."""
 
 
-def unknown_key(word: str, known: Collection[str], beside: Collection[str] = ()) -> tuple[str, str, Fix | None]:
-    """What is wrong with an unknown key beside others, empty for a misspelt one, a hint, and the only fix."""
+def unknown_key(word: str, known: Collection[str]) -> tuple[str, str]:
+    """What is wrong with an unknown key beside others, empty for a misspelt one, and a hint."""
     if (found := _SPACE_MISSING.fullmatch(word)) and found["key"] in known:
         key, value = found["key"], found["value"].strip()
-        return f"a space is missing after the colon of '{key}'", _write(key, value), Fix(word, f"{key}: {value}")
-    return "", did_you_mean(word, known), only_fix(word, known, beside)
+        return f"a space is missing after the colon of '{key}'", _write(key, value)
+    return "", did_you_mean(word, known)
 
 
 def meant(word: str, known: Collection[str]) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
 from dodo_dsl import __version__, package_data
-from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, only_fix, shown_path
+from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, shown_path
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain, resolve
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.matrix import REPORTED
@@ -255,13 +255,13 @@ def _fits(schema: dict[str, Any], value: object) -> bool:
 def _additional(v: Violation) -> Iterator[Diagnostic]:
     known = v.schema.get("properties", {})
     for *_, name in itertools.islice(v.places, MAX_PROBLEMS):
-        slip, hint, fix = unknown_key(str(name), known, v.instance)
-        if not fix and not slip and set(known) == {"uses", "with"}:
+        slip, hint = unknown_key(str(name), known)
+        if not hint and not slip and set(known) == {"uses", "with"}:
             hint = f"parameters of a service belong into 'with': {{{name}: ...}}"
         elif not slip:
             hint = home(str(name), v.entries, v.schema) or hint
         message = slip or f"unknown key {_shown(name)}"
-        yield Diagnostic(v.entries[str(name)].key, "unknown-key", message, hint, fix=fix)
+        yield Diagnostic(v.entries[str(name)].key, "unknown-key", message, hint)
 
 
 def _required(v: Violation) -> Iterator[Diagnostic]:
@@ -269,9 +269,9 @@ def _required(v: Violation) -> Iterator[Diagnostic]:
     unknown = [name for name in v.instance if name not in known]
     if v.is_closed and any(meant(name, known) == missing for name in unknown):
         return  # it is reported as an unknown key
-    if not v.is_closed and (almost := next((name for name in unknown if only_fix(name, [missing])), "")):
-        hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
-        yield Diagnostic(v.entries[almost].key, "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
+    if not v.is_closed and (almost := next((name for name in unknown if closest(name, [missing])), "")):
+        hint = did_you_mean(almost, [missing])
+        yield Diagnostic(v.entries[almost].key, "unknown-key", f"unknown key {_shown(almost)}", hint)
         return
     hint = to_write(missing, known.get(missing, {}))
     if v.key in known and v.path:
@@ -300,14 +300,14 @@ def _type(v: Violation) -> Iterator[Diagnostic]:
     found = _shown(v.text) if v.text else "empty"
     if isinstance(value, dict | list):
         found = _TYPE_NAMES["object" if isinstance(value, dict) else "array"]
-    span, hint, fix = v.span, _in_quotes(v), None
+    span, hint = v.span, _in_quotes(v)
     if isinstance(v.node, Sequence) and wanted == "object":
         span, hint = v.node.span, "write 'key: value' in place of list items"
     elif wanted == "array" and isinstance(value, str) and _fits(schema, [value]):
         hint = f"write {v.key}: {in_line([value])}"
     elif wanted == "boolean" and isinstance(value, str):
-        hint, fix = boolean_meant(value)
-    yield Diagnostic(span, "wrong-type", f"{v.name} is {found}, expected {' or '.join(names)}", hint, fix=fix)
+        hint = boolean_meant(value)
+    yield Diagnostic(span, "wrong-type", f"{v.name} is {found}, expected {' or '.join(names)}", hint)
 
 
 def _in_quotes(v: Violation) -> str:
@@ -328,17 +328,17 @@ def _quantity(v: Violation) -> Iterator[Diagnostic]:
     try:
         quantity.convert(v.text if isinstance(v.node, Scalar) else None, v.schema[UNIT])
     except quantity.QuantityError as problem:
-        yield Diagnostic(v.span, "wrong-unit", f"{v.name}: {problem}", problem.hint, fix=problem.fix)
+        yield Diagnostic(v.span, "wrong-unit", f"{v.name}: {problem}", problem.hint)
 
 
 def _choices(v: Violation) -> Iterator[Diagnostic]:
     choices = [str(v) for v in v.schema.get("enum") or v.schema[WORDS]]
     message = f"{_shown(v.instance)} is not a value of {v.name}, expected {', '.join(choices)}"
     near = [choice for choice in closest(str(v.instance), choices) if resolve(choice) == choice]
-    hint, fix = did_you_mean(str(v.instance), near), only_fix(str(v.instance), near)
+    hint = did_you_mean(str(v.instance), near)
     if v.text in choices:
-        hint, fix = _in_quotes(v), None
-    yield Diagnostic(v.span, "wrong-value", message, hint, fix=fix)
+        hint = _in_quotes(v)
+    yield Diagnostic(v.span, "wrong-value", message, hint)
 
 
 def _const(v: Violation) -> Iterator[Diagnostic]:
