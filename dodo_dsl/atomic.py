@@ -1,14 +1,8 @@
 """Files and folders that appear whole or not at all: written beside their place under a hidden name, then renamed.
 
-A reader, another writer and a killed process see the old content or the new, never a part, and a failure leaves no
-temporary file. A file replaces nothing but a file, and a folder nothing but an empty folder of this user: devices,
-FIFOs and sockets stay, and nothing is written into the folders of the kernel. A symlink to a file is replaced; what it
-points to stays. A new file has the permissions that the umask leaves it, one that is replaced keeps its own.
-
-A rename does not wait for the disk. ``durable`` does, before and after it: for what must outlive a loss of power,
-as a recording cut from another or a rig's quarantine. What can be made again is not worth the wait.
-
-Results of a command replace existing files only with ``--force``, and nothing else ever.
+A file replaces nothing but a file, and a folder nothing but an empty folder of this user: devices, FIFOs and sockets
+stay, and nothing is written into the folders of the kernel. A symlink to a file is replaced; what it points to stays.
+A file that is replaced keeps its permissions. With ``durable`` it outlives a loss of power, too.
 """
 
 import contextlib

@@ -236,7 +236,6 @@ def _at(checked: Checked, spec: Spec, label: str, values: Mapping[str, Values]) 
 
 
 def access(deployment: Deployment) -> Access:
-    """What the deployment allows its application."""
     roots = (str(deployment.root),) if deployment.file else ()
     ports = tuple(port.text for rig in deployment.rigs.values() if isinstance(port := rig.node.get(PORT), Scalar))
     return Access(roots, tuple(deployment.paths), deployment.environment, deployment.outside, ports=ports)

@@ -69,7 +69,6 @@ def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
 
 
 def ordered(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
-    """Sorted by position, each once."""
     return sorted(set(diagnostics))
 
 
@@ -108,7 +107,6 @@ def shown_path(file: str) -> str:
 
 @functools.lru_cache(maxsize=4)
 def _lines(file: str) -> list[str]:
-    """The lines of a file, up to the maximum size of a spec."""
     path = Path(file)
     if not path.is_file():
         return []

@@ -135,7 +135,6 @@ def _first(failure: Failure, number: int) -> Diagnostic | None:
 
 
 def _indent(line: str) -> int:
-    """The number of spaces that a line begins with."""
     return len(line) - len(line.lstrip(" "))
 
 

@@ -41,7 +41,6 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def push(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    """Builds and pushes the images, and writes a line for each; raises UsageError, DockerError."""
     deployment = selection.checked_deployment()
     files = selection.existing_files(options.application) or deployment.application
     if not files:
@@ -71,7 +70,6 @@ _PASSED = ("PATH", "HOME", "DOCKER_CONFIG", "DOCKER_HOST", "DOCKER_TLS_VERIFY", 
 
 
 def _bake(builds: dict[str, Any], options: argparse.Namespace, folder: Path) -> list[str]:
-    """Builds and pushes the images, and names each with its digest; raises DockerError."""
     images = {name: f"{options.push}/{name}" for name in builds["services"]}
     if not images:
         return []

@@ -79,7 +79,6 @@ _NOTHING = ":"
 
 
 def _job_options(options: argparse.Namespace) -> JobOptions:
-    """Raises UsageError for a file of images that is none."""
     images: tuple[str, ...] = ()
     if options.images:
         with files_of_the_user():

@@ -17,7 +17,6 @@ class Exit(IntEnum):
 
 
 def of_outcomes(outcomes: Iterable[str]) -> Exit:
-    """The exit code for tests that passed, failed or ended in error."""
     kinds = set(outcomes)
     return Exit.ERROR if "error" in kinds else Exit.PROBLEMS if "failed" in kinds else Exit.OK
 
@@ -67,5 +66,4 @@ def sentence(error: Exception) -> str:
 
 
 def _is_no_utf8(error: Exception) -> bool:
-    """Whether the bytes of a name, which are not UTF-8, were to be written as text."""
     return isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed"

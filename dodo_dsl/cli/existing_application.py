@@ -25,7 +25,6 @@ class Pictures:
     height: int = 480
 
     def parameters(self, service: str) -> dict[str, str]:
-        """What is not the default, as parameters of DoDo's ``service``, as far as it has them."""
         known = load_manifests()[0][service].parameters
         wanted = {f"name.{kind}": name for kind, name in self.memories.items() if name != _USUAL.get(kind)}
         sizes = {"width": str(self.width), "height": str(self.height)}
@@ -34,7 +33,6 @@ class Pictures:
 
     @property
     def note(self) -> str:
-        """What a new test takes from the application; empty if that is nothing."""
         named = ", ".join(self.memories.values())
         return f"camera settings taken from service '{self.service}': {named}, {self.width}x{self.height}\n" * bool(
             named

@@ -67,7 +67,6 @@ def _page(page: catalogue.Page) -> dict[str, str]:
 
 
 def explain(test: ResolvedTest) -> Explanation:
-    """One instance, as far as it can be read."""
     spec, wiring = test.spec, test.wiring
     values = {service.use.name: _values(service.arguments.values()) for service in test.services}
     return {
@@ -93,7 +92,6 @@ def explain(test: ResolvedTest) -> Explanation:
 
 
 def _values(arguments: Iterable[Argument]) -> dict[str, str]:
-    """With their units; without those that do not fit."""
     units = {each.parameter.name: each.parameter.unit.replace(SHARE, "") for each in arguments}
     return {
         each.parameter.name: f"{each.value.text} {units[each.parameter.name]}".rstrip()
@@ -133,12 +131,10 @@ def _topic(topic: Resolved) -> dict[str, Any]:
 
 
 def _is_alone(wiring: Wiring, port: Port) -> bool:
-    """Whether no service of the test produces by name what a port consumes."""
     return all(producer.port.name == ANYTHING for producer in wiring.producers(port))
 
 
 def _sender(end: End, wiring: Wiring) -> str:
-    """A producer, and whether it only prints the message."""
     is_printed = any((each.service, each.port) == (end.service, end.port) for each in wiring.printed)
     return f"{end.service} (application, prints it)" if is_printed else _shown([end])[0]
 

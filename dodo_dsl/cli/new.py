@@ -152,7 +152,6 @@ def _application(options: argparse.Namespace, stdout: TextIO) -> int:
 
 
 def compose_file(root: Path) -> str:
-    """The name of the compose file in a folder, empty when there is none."""
     return next((name for name in COMPOSE_FILES if (root / name).is_file()), "")
 
 
@@ -262,7 +261,6 @@ def _refuse_contradictions(options: argparse.Namespace) -> None:
 
 
 def _check_name(name: str, taken: Sequence[str]) -> None:
-    """Raises UsageError for an invalid name, or one that is taken."""
     if not _NAME.fullmatch(name) or len(name) > _LONGEST:
         expected = "lower-case letters and digits in words joined by single hyphens, at most 60 characters"
         raise UsageError(f"'{name}' is not a valid name, expected {expected}")
@@ -290,7 +288,6 @@ def _registry(checked: Checked) -> Path:
 def _files(
     options: argparse.Namespace, checked: Checked, shipped: Checked, registry: Path, root: Path
 ) -> tuple[list[New], str]:
-    """The test's own files, its spec first; with a note for the user."""
     own = compose_file(root) if checked.deployment.file is None else ""
     application = checked.application or (as_written(root / own) if own else None)
     pictures = existing_application.pictures(application)
@@ -313,7 +310,6 @@ def _files(
 def _from_another(
     name: str, base_name: str, checked: Checked, shipped: Checked, registry: Path, root: Path
 ) -> tuple[list[New], str]:
-    """A test that extends one of the repository, or a copy of one that ships with DoDo."""
     own = [spec for spec in checked.specs if not package_data.is_shipped(spec.location.root, root)]
     copied = [spec for spec in shipped.specs if package_data.is_shipped(spec.location.root, root)]
     base = next((spec for spec in (*own, *copied) if spec.name == base_name), None)

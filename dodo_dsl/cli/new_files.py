@@ -28,8 +28,6 @@ _TARGET = "targets/weave.csv"
 
 @dataclass(frozen=True)
 class New:
-    """A file to write: its path and its content."""
-
     path: Path
     content: bytes
 
@@ -76,13 +74,11 @@ def world_files(text: bytes, registry: Path) -> list[New]:
 
 
 def map_files(name: str, folder: Path) -> list[New]:
-    """A copy of a shipped map."""
     shipped = sorted((package_data.registry() / "maps" / name).iterdir())
     return [New(folder / path.name, path.read_bytes()) for path in shipped]
 
 
 def extending_files(name: str, base: Spec, root: Path) -> list[New]:
-    """A test that extends ``base``, in its registry."""
     path = base.path.relative_to(base.location.root.resolve()).as_posix()
     text = filled("tests/extends.dodo.yml", name=name, base=path, of=base.name)
     return spec_files(name, base.location.root / name, root, text)
@@ -122,7 +118,6 @@ def _copied_text(name: str, base: Spec) -> bytes:
 
 
 def write_new(files: Sequence[New], stdout: TextIO) -> None:
-    """Writes new files; raises UsageError before that if one is there."""
     for file in files:
         if file.path.exists():
             raise UsageError(f"'{shown_path(str(file.path))}' exists already; nothing was written")
@@ -134,5 +129,4 @@ def write_new(files: Sequence[New], stdout: TextIO) -> None:
 
 
 def say_next(steps: Sequence[str], stdout: TextIO) -> None:
-    """What the user may do now, one step a line."""
     stdout.write("\nnext: " + "\n      ".join(steps) + "\n")

@@ -178,7 +178,6 @@ def _refuse_to_keep(plans: Sequence[Plan]) -> None:
 def runner_of(
     options: argparse.Namespace, jobs: Sequence[Job], deployment: Deployment, stdout: TextIO, load: Loading
 ) -> Runner:
-    """The runner of these jobs, announced."""
     plans = [job.plan for job in jobs]
     backend = options.backend or choose_backend(plans)
     order = schedule(options.jobs, expectation(backend))

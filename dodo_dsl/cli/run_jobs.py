@@ -91,7 +91,6 @@ def load_compiled(folder: Path, settings: Settings) -> Plan:
 
 
 def _deployment(stdout: TextIO) -> Deployment:
-    """The deployment that the command is called in, for its CIDs and subnets."""
     deployment, problems = load_deployment(find_deployment(Path.cwd()))
     write_diagnostics(stdout, problems)
     if has_errors(problems):

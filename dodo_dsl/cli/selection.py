@@ -110,7 +110,6 @@ def _is_name(word: str, spec: Spec) -> bool:
 
 
 def _is_meant(word: str, spec: Spec) -> bool:
-    """Whether a word is the name of a test, with parameters or without."""
     return _is_name(word, spec) or _is_name(_parsed(word)[0], spec)
 
 

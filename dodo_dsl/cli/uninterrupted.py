@@ -18,28 +18,23 @@ def more_descriptors() -> None:
 
 
 @contextlib.contextmanager
-def undisturbed() -> Iterator[None]:
+def _handled(numbers: Iterable[signal.Signals], handler: Any) -> Iterator[None]:
+    before = {number: signal.signal(number, handler) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, old in before.items():
+            signal.signal(number, old)
+
+
+def undisturbed() -> contextlib.AbstractContextManager[None]:
     """Ignores Ctrl-C and signals, so that existing results are written."""
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = [signal.signal(number, signal.SIG_IGN) for number in numbers]
-    try:
-        yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
+    return _handled((signal.SIGINT, signal.SIGTERM, signal.SIGHUP), signal.SIG_IGN)
 
 
-@contextlib.contextmanager
-def signals_interrupt() -> Iterator[None]:
+def signals_interrupt() -> contextlib.AbstractContextManager[None]:
     """SIGTERM and SIGHUP are as Ctrl-C while this lasts, and afterwards what they were."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    try:
-        for number in before:
-            signal.signal(number, stop_like_interrupt)
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    return _handled((signal.SIGTERM, signal.SIGHUP), stop_like_interrupt)
 
 
 class UninterruptedStream:

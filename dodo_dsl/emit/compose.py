@@ -62,7 +62,6 @@ def layer(plan: Plan, name: str) -> dict[str, Any]:
 
 
 def _rest(plan: Plan, own_network: bool) -> dict[str, Any]:
-    """The network and the volumes of all layers."""
     volumes: dict[str, Any] = {"dodo-channel": {"driver_opts": {**_IN_MEMORY, "o": "size=1m,mode=1777"}}, "report": {}}
     if not own_network:
         return {"volumes": volumes}
@@ -124,7 +123,6 @@ def _healthcheck(test: list[str], seconds: float) -> dict[str, Any]:
 
 
 def _service(plan: Plan, service: PlannedService) -> dict[str, Any]:
-    """A planned service as a container."""
     environment = {"<<": Alias("environment"), "DODO_SERVICE": service.name}
     if service.name == CLOCK:
         environment[RUNNER_VARIABLE] = f"${{{RUNNER_VARIABLE}:-}}"
@@ -150,7 +148,6 @@ def _word(flag: Flag) -> str:
 
 
 def _common(plan: Plan) -> list[Any]:
-    """The volumes of all services."""
     return ["tmp:/tmp" if plan.isolation == "network" else "/tmp:/tmp", f"dodo-channel:{CHANNEL}"]
 
 

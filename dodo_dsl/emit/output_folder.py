@@ -6,7 +6,7 @@ import filecmp
 import json
 import shutil
 import stat
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -80,13 +80,10 @@ def _replace(folder: Path, wanted: _Entries) -> None:
     """The folder appears as a whole, unless all in it is there already."""
     if not wanted:
         shutil.rmtree(folder, ignore_errors=True)
-    elif not _surplus(folder, wanted) and all(_is_written(folder / name, entry) for name, entry in wanted.items()):
-        return
-    else:
+    elif _changed(folder, wanted):
         with atomic.new_folder(folder) as stage:
-            for parent in {(stage / name).parent for name in wanted}:
-                parent.mkdir(parents=True, exist_ok=True)
             for name, entry in wanted.items():
+                (stage / name).parent.mkdir(parents=True, exist_ok=True)
                 _put(stage / name, entry)
             _open_to_containers(stage / FILES if (stage / PLAN_FILE).exists() else stage)
             if folder.exists():
@@ -110,11 +107,12 @@ def _is_written(path: Path, entry: str | Path | _Link) -> bool:
     return path.read_bytes() == entry.encode() if isinstance(entry, str) else filecmp.cmp(entry, path, shallow=False)
 
 
-def _surplus(folder: Path, wanted: _Entries) -> list[str]:
-    """What earlier compilations put into a folder, and this one does not."""
-    found = [path for path in sorted(folder.rglob("*")) if path.is_symlink() or path.is_file()]
-    names = (path.relative_to(folder).as_posix() for path in found)
-    return [n for n in names if n not in wanted and (folder.name == SHARED or n.partition("/")[0] == FILES)]
+def _changed(folder: Path, wanted: _Entries) -> list[str]:
+    """What differs from a folder, and what an earlier compilation put there and this one does not."""
+    found = (path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*")) if not path.is_dir())
+    ours = (name for name in found if folder.name == SHARED or name.startswith(f"{FILES}/"))
+    surplus = [name for name in ours if name not in wanted]
+    return [*(name for name, entry in wanted.items() if not _is_written(folder / name, entry)), *surplus]
 
 
 def _open_to_containers(folder: Path) -> None:
@@ -133,24 +131,19 @@ def stale_folders(compiled: Compiled, out: Path) -> list[Path]:
 
 def differences(compiled: Compiled, pipeline: File, out: Path) -> dict[str, str]:
     """What writing would change below ``out``, a unified diff by test, the pipeline's first; empty when up to date."""
-    found = {pipeline.path: "".join(_difference(out, "", {pipeline.path: pipeline.text}))}
+    found = {pipeline.path: "".join(_difference(out, "", {pipeline.path: pipeline.text}, [pipeline.path]))}
     for name, wanted in ((SHARED, _of_all(compiled)), *((p.slug, _of_test(compiled, p)) for p in compiled.suite.plans)):
-        surplus = (f"no longer needed: {name}/{each}\n" for each in _surplus(out / name, wanted))
-        found[name] = "".join([*_difference(out / name, f"{name}/", wanted), *surplus])
+        found[name] = "".join(_difference(out / name, f"{name}/", wanted, _changed(out / name, wanted)))
     found.update((folder.name, f"only in {out.name}: {folder.name}\n") for folder in stale_folders(compiled, out))
     return {name: text for name, text in found.items() if text}
 
 
-def _difference(folder: Path, shown: str, wanted: _Entries) -> list[str]:
-    lines: list[str] = []
-    for name, entry in wanted.items():
-        path = folder / name
-        if _is_written(path, entry):
-            continue
+def _difference(folder: Path, shown: str, wanted: _Entries, changed: Sequence[str]) -> Iterator[str]:
+    for name in changed:
+        path, entry = folder / name, wanted.get(name)
         if isinstance(entry, str):
             before = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
             names = f"a/{shown}{name}", f"b/{shown}{name}"
-            lines += difflib.unified_diff(before.splitlines(True), entry.splitlines(True), *names)
+            yield from difflib.unified_diff(before.splitlines(True), entry.splitlines(True), *names)
         else:
-            lines.append(f"differs: {shown}{name}\n")
-    return lines
+            yield f"{'differs' if entry else 'no longer needed'}: {shown}{name}\n"

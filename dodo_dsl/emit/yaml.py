@@ -41,7 +41,6 @@ def _lines(value: Mapping[str, Any], pad: str, is_whole: bool = False) -> Iterat
 
 
 def flow(value: Any) -> str:
-    """A value on one line."""
     if isinstance(value, Alias):
         return f"*{value}"
     if isinstance(value, str):

@@ -35,7 +35,6 @@ def assemble(folder: Path) -> None:
 
 
 def default_base_image() -> str:
-    """The Dockerfile's own base image."""
     text = (package_data.root() / _DOCKERFILE).read_text(encoding="utf-8")
     return text.partition("ARG BASE_IMAGE=")[2].split()[0]
 
@@ -46,8 +45,6 @@ _QUESTION = "import platform, sys; print(sys.version_info[1], platform.machine()
 
 
 class WheelsError(Exception):
-    """Wheels that cannot be provided; one sentence."""
-
     usage = False
 
 

@@ -11,8 +11,6 @@ from dodo_dsl import advice
 
 
 class DockerError(Exception):
-    """A part of Docker is missing, or a docker command failed; one sentence."""
-
     usage = False
 
 

@@ -58,7 +58,6 @@ def serve(stdin: BinaryIO, stdout: BinaryIO) -> None:
 
 
 def _read(stdin: BinaryIO) -> Message | None:
-    """The next message; None at the end of the input."""
     size = 0
     while line := stdin.readline().strip():
         name, _, value = line.partition(b":")

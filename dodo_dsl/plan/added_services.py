@@ -166,7 +166,6 @@ def _pictures(test: ResolvedTest) -> Iterator[Flag]:
 
 
 def _own_hz(test: ResolvedTest) -> float:
-    """The rate of the fastest camera."""
     known = rates(test.services)
     return max((known.get(name, _EACH_HZ) for name in cameras_of(test.wiring)), default=_EACH_HZ)
 

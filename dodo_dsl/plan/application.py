@@ -21,7 +21,6 @@ _LONG = 200
 
 
 def plan_application(application: ApplicationSource, setting: Setting) -> Application:
-    """The application as a test runs it."""
     construction = Construction(application, setting)
     services = {name: _container(construction, name, made) for name, made in construction.services().items()}
     access = replace(
@@ -73,7 +72,6 @@ def _container(construction: Construction, name: str, made: dict[str, Any]) -> d
 
 
 def _in_graph(service: ComposeService, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
-    """The variables of a service whose graph is the test's."""
     set_, maybe = variables(setting.cid, own_network=setting.own_network)
     own = {name: value for name, value in maybe.items() if name not in service.file_variables}
     return {**own, **given, **set_}

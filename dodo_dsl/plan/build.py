@@ -133,7 +133,6 @@ class _Builder:
         self.shown: dict[str, str] = {}
 
     def plan(self) -> Plan:
-        """The instance's Plan."""
         spec, rig = self.spec, self.rig
         automatic = tuple(self._automatic())
         services = (*automatic, *(self._service(service) for service in self.test.services))
@@ -197,7 +196,6 @@ class _Builder:
         )
 
     def _bridge(self) -> Iterator[str]:
-        """The flags of what stands between the bus and the application's ROS graph."""
         graph = ros_topics.graph(self.test.wiring.topics)
         yield from dict.fromkeys(f"--name={topic.bus[0]}" for topic in graph.given if topic.camera)
         own = {
@@ -215,7 +213,6 @@ class _Builder:
         return Pooled(test.title, test.slug)
 
     def _messages(self) -> tuple[str, ...]:
-        """The deployment's messages, copied next to the test for its services to read."""
         targets = [f"messages/{number}-{path.name}" for number, path in enumerate(self.deployment.messages)]
         self.files.update(
             FileCopy(t, path.resolve()) for t, path in zip(targets, self.deployment.messages, strict=True)
@@ -241,7 +238,6 @@ class _Builder:
         return f"{self.deployment.image_prefix}/{image}:{self.deployment.image_tag}" if bare else image
 
     def _automatic(self) -> Iterator[PlannedService]:
-        """The services that DoDo adds: the recorder, and in lockstep the clock."""
         own = self.manifests[added_services.RECORDER_MANIFEST]
         yield added_services.recorder(self.test, own, self._image(own.image), self.cid)
         if self.spec.is_stepped:

@@ -21,8 +21,6 @@ _OTHER = re.compile(r"[^A-Za-z0-9._-]")
 
 
 class FilesError(ValueError):
-    """Files of a test that cannot be copied."""
-
     usage = True
 
 
