@@ -22,7 +22,6 @@ from dodo_dsl.application.read import read_application
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.diagnostics import format_text, has_errors
-from dodo_dsl.images import docker_command
 from dodo_dsl.images.docker_command import DockerError
 from dodo_dsl.run.docker.builds import HiddenContext, own_contexts
 from dodo_dsl.run.hidden_paths import of_repository
@@ -80,7 +79,6 @@ def _bake(builds: dict[str, Any], options: argparse.Namespace, folder: Path) -> 
     words += ["--set", f"*.platform={options.platform}"] if options.platform else []
     environment = {name: os.environ[name] for name in _PASSED if name in os.environ}
     environment["BUILDX_BAKE_ENTITLEMENTS_FS"] = "0"  # the contexts are copies that are checked, in no working folder
-    docker_command.require()
     if subprocess.call(words, env=environment, stdout=subprocess.DEVNULL):
         raise DockerError("the application's images cannot be built and pushed; the output above says why")
     told = [each for each in json.loads(metadata.read_text()).values() if isinstance(each, dict)]

@@ -31,19 +31,6 @@ def ask(*words: str) -> str:
     return result.stdout.strip()
 
 
-def require() -> None:
-    """Raises DockerError when no engine answers the docker command, or when it cannot build with buildx."""
-    _docker()
-    try:
-        ask("version", "--format", "{{.Server.Version}}")
-    except DockerError as error:
-        raise DockerError(f"no Docker engine answers ({str(error).rstrip('.')}): {advice.engine()}") from None
-    try:
-        ask("buildx", "version")
-    except DockerError:
-        raise DockerError(f"docker has no buildx: {advice.docker_plugin('buildx')}") from None
-
-
 def show(*words: str, folder: Path | None = None, variables: Mapping[str, str] | None = None) -> bool:
     """Whether a docker command succeeds, which shows its progress by itself."""
     sys.stdout.flush()
