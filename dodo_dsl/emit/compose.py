@@ -29,10 +29,6 @@ WAY_OUT = "mount it read-only (:ro), name it under 'paths' in dodo.yml, or raise
 _TRIES_A_SECOND = 2
 _IN_MEMORY = {"type": "tmpfs", "device": "tmpfs"}
 _CONFINED = {"read_only": True, "cap_drop": ["ALL"], "security_opt": ["no-new-privileges:true"]}
-_SHARED_KEYS = (
-    "ipc", "network_mode", "pids_limit", "mem_limit", "ulimits", "cap_drop", "security_opt", "logging", "depends_on"
-)  # fmt: skip
-"""Keys of the application's services that mostly have one value, as the test sets it."""
 
 
 def layer(plan: Plan, name: str) -> dict[str, Any]:
@@ -194,17 +190,3 @@ def _as_written(source: str, folder: str) -> str:
         return source
     relative = posixpath.relpath(source, folder)
     return relative if relative == "." else f"./{relative}"
-
-
-def application(compose: dict[str, Any]) -> dict[str, Any]:
-    """The application's copy; what all its services share stands once."""
-    services = compose.get("services") or {}
-    first, *others = services.values() or [{}]
-    shared = {k: first[k] for k in _SHARED_KEYS if others and k in first and all(o.get(k) == first[k] for o in others)}
-    if not shared:
-        return compose
-    own = {
-        name: {"<<": Alias("shared"), **{key: value for key, value in each.items() if key not in shared}}
-        for name, each in services.items()
-    }
-    return {"x-shared": shared, **compose, "services": own}

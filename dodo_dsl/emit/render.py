@@ -34,7 +34,7 @@ def _files(plan: Plan) -> Iterator[tuple[str, str]]:
     names = [f"{layer}.compose.yml" for layer in LAYERS]
     for layer, name in zip(LAYERS, names, strict=True):
         is_own = layer == "application"
-        document = compose.application(plan.application.compose) if is_own else compose.layer(plan, layer)
+        document = plan.application.compose if is_own else compose.layer(plan, layer)
         about = {"first": LAYERS[0], "recorder": RECORDER, "report": compose.REPORT}
         yield name, _filled("layer.compose.yml.j2", plan=plan, layer=layer, document=document, **about)
     judges = [service.name for service in plan.services if service.judge]

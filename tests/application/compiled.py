@@ -69,7 +69,6 @@ class Compiled:
         """The compiled ``application.compose.yml`` as compose reads it, with the variables of the test's ``.env``."""
         assert self.files, self.told
         found = yaml.safe_load(self.files["application.compose.yml"])
-        found.pop("x-shared", None)
         variables = {"HOME": _HOME, **_dotenv(self.files[".env"])}
         made: dict[str, Any] = filled(found, variables)
         for service in made["services"].values():

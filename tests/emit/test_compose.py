@@ -9,7 +9,7 @@ import yaml
 
 from dodo_dsl import source
 from dodo_dsl.emit import yaml as written
-from dodo_dsl.emit.compose import FILES_MOUNT, application, layer
+from dodo_dsl.emit.compose import FILES_MOUNT, layer
 from dodo_dsl.plan.model import Flag, Plan, PlannedService
 from tests.run.helpers import Bench
 
@@ -87,13 +87,6 @@ def test_a_service_sees_the_shared_files_of_its_own_paths(plan: Plan) -> None:
     camera = service(replace(plan, shared={"a/$b.json": map_, "a/$b.json2": other}), "environment", "camera")
     mount = {**FILES_MOUNT, "source": f"../_files/{map_}", "target": f"/_files/{map_}"}
     assert camera["volumes"] == [*COMMON, FILES_MOUNT, mount, "report:/dodo/report"]
-
-
-def test_what_all_services_of_the_application_share_stands_once() -> None:
-    services = {name: {"image": name, "ipc": "host", "cap_drop": ["ALL"]} for name in "ab"}
-    text = written.text(application({"services": services}))
-    assert text.count("cap_drop") == 1
-    assert yaml.safe_load(text)["services"] == services
 
 
 _WORDS = "on No null 1e3 0x1 1:20 a: -x --x=1 *a &a !a %a @a << ./a .. .5 /a é 2020-01-01 --x=a,b --path=/a/$$b"
