@@ -52,7 +52,6 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("generated"),
                         help="output folder (default: generated)")  # fmt: skip
     parser.add_argument("--check", action="store_true", help="write nothing; show problems and what is stale in DIR")
-    parser.add_argument("-q", "--quiet", action="store_true", help="print only problems, and what is stale")
     parser.add_argument("--format", choices=tuple(FORMATS), default="text",
                         help="format of diagnostics (default: text); with gitlab the text goes to stderr")  # fmt: skip
     parser.add_argument("--tags", type=_tags, default=DEFAULT_TAGS, metavar="TAGS",
@@ -129,8 +128,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.images and options.check:
         raise UsageError("--images are for what is written: call dodo compile without --check")
     checked = selection.select(options.path, (), options.application)
-    if not options.quiet:
-        (stdout if options.format == "text" else stderr).write(selection.left_out(checked))
+    (stdout if options.format == "text" else stderr).write(selection.left_out(checked))
     if options.check:
         return _check(checked, options, stdout, stderr)
     return _write(checked, options, stdout, stderr)
@@ -180,8 +178,7 @@ def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
         log.write(f"... {len(difference) - _MOST_LINES} more lines\n" if len(difference) > _MOST_LINES else "")
         warnings = [_count(len(diagnostics), "warning")] if diagnostics else []
         state = ", ".join([*warnings, *([outdated] if stale else [])])
-        if not options.quiet or stale:
-            log.write(f"{_count(len(checked.specs))} checked: {state or 'no problems'}\n")
+        log.write(f"{_count(len(checked.specs))} checked: {state or 'no problems'}\n")
     elif stale:
         stderr.write(f"{outdated}\n")
     return Exit.PROBLEMS if stale else Exit.OK
@@ -201,7 +198,7 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
         return Exit.USAGE
     gone = [folder.name for folder in stale_folders(made.compiled, options.output)]
     write(made.compiled, made.pipeline, options.output, jobs.images)
-    if options.format == "text" and not options.quiet:
+    if options.format == "text":
         stdout.write(f"{_count(len(made.compiled.suite.plans))} compiled into {options.output}\n")
         stdout.write(f"removed {_count(len(gone), 'stale test')}: {', '.join(gone)}\n" if gone else "")
     return Exit.OK
