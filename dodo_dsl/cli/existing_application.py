@@ -1,13 +1,15 @@
-"""What ``dodo new`` takes from a compose file that is there: the pictures that the application reads."""
+"""What ``dodo new`` takes from a compose file that is there: what stands around the application, and its pictures."""
 
 import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from dodo_dsl.application import stack
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.opendlv_flags import pictures_of
+from dodo_dsl.application.read import as_written
 from dodo_dsl.spec.manifest import load_manifests
 
 _USUAL = {"argb": "video0.argb", "i420": "video0.i420", "width": "640", "height": "480"}
@@ -49,6 +51,13 @@ def pictures(application: ApplicationSource | None) -> Pictures:
                 memories.setdefault(kind or "argb", name)
             return Pictures(asked.service, memories, asked.width or 640, asked.height or 480)
     return Pictures()
+
+
+def replaced(file: Path) -> dict[str, str]:
+    """The services of a compose file that a test leaves out, as YAML, with what it has instead of each."""
+    application = as_written(file)
+    parts = stack.parts(application) if application else {}
+    return {item(name): part.instead for name, (_, part) in parts.items()}
 
 
 def item(text: str) -> str:

@@ -11,7 +11,7 @@ from typing import TextIO
 from dodo_dsl import __version__, package_data
 from dodo_dsl.application.read import as_written
 from dodo_dsl.cli import existing_application
-from dodo_dsl.cli.errors import Exit, UsageError
+from dodo_dsl.cli.errors import Exit, UsageError, files_of_the_user
 from dodo_dsl.cli.new_files import (
     SCHEMA_FOLDERS,
     SCHEMAS,
@@ -70,6 +70,7 @@ EXAMPLES = """examples:
   dodo new dil-mine --level dil --rec drive.rec        your own recording, and its signal as the target
   dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a shipped test and its files
   dodo new --map chicane --line 'straight 1 m, left 45 deg radius 1 m, right 45 deg radius 1 m, straight 1 m'
+  dodo new --map hall --line points.csv --width '80 cm'  a map along points, x and y in m
   dodo new --application                               an application that drives, with a test that it passes
   dodo new --application --language cpp                the same in C++, on libcluon
   dodo new --application --ros                         a ROS 2 node in Python
@@ -99,7 +100,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     of_test.add_argument("--rec", metavar="FILE.rec", type=Path,
                          help="recording that a new dil test plays, with its target")  # fmt: skip
     of_map = parser.add_argument_group("of a map")
-    of_map.add_argument("--line", metavar="LINE", help="its centre line, as below")
+    of_map.add_argument(
+        "--line", metavar="LINE", help="its centre line, as below, or a CSV file of points, x and y in m"
+    )
     of_map.add_argument("--width", metavar="W", help="width of the track (default: 50 cm)")
     of_map.add_argument("--lap", action="store_true", help="the line ends where it begins")
     of_application = parser.add_argument_group("of an application")
@@ -156,7 +159,8 @@ def compose_file(root: Path) -> str:
 
 
 def _dodo_yml(root: Path, application: str) -> New:
-    return New(root / FILE_NAME, filled(FILE_NAME, application=application))
+    without = existing_application.replaced(root / application) if compose_file(root) else {}
+    return New(root / FILE_NAME, filled(FILE_NAME, application=application, without=without))
 
 
 def _deployment(stdout: TextIO) -> int:
@@ -207,11 +211,14 @@ def _map(options: argparse.Namespace, stdout: TextIO) -> int:
     from dodo_dsl.cli import new_map
 
     if not options.line:
-        raise UsageError(f"--map needs --line, the centre line of the track: {new_map.EXPECTED}")
+        raise UsageError(
+            f"--map needs --line, the centre line of the track: {new_map.EXPECTED}, or a CSV file of points"
+        )
     _check_name(options.map, ())
     checked = load([])
     folder = _registry(checked) / "maps" / options.map
-    track = new_map.track(options.line, options.width or f"{new_map.LANE} m", options.lap)
+    with files_of_the_user():
+        track = new_map.track(options.line, options.width or f"{new_map.LANE} m", options.lap)
     content = (new_map.as_json(new_map.track_map(track)) + "\n").encode()
     files = [
         New(file.path, content) if file.path.name == "map.json" else file for file in map_files("straight", folder)

@@ -1,11 +1,13 @@
 """``dodo new --map``: a track of cones around a centre line, as a map that services read."""
 
+import csv
 import json
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 from dodo_dsl.cli.errors import UsageError
@@ -18,6 +20,8 @@ Pose = tuple[float, float, float]
 LANE = 0.5
 _MOST = 1000
 SPACING = 0.25
+_TURN_BACK = 1e-6
+"""Radians that a corner is short of a turn on the spot."""
 BEHIND, BEYOND = 0.3, 1.0
 BESIDE = 0.08
 LEAD, BACK = 0.8, 0.3
@@ -77,10 +81,15 @@ class Track:
 
 
 def track(line: str, width: str, lap: bool) -> Track:
-    """The track along a centre line of parts from x = 0, y = 0 along +y; raises UsageError."""
-    sections = [_section(part.strip()) for part in line.split(",")]
-    start = (0.0, -LEAD, math.pi / 2) if lap else Track.start
-    made = Track(sections, start, lap, width=_quantity("--width", width, "m"))
+    """The track along a centre line: parts from x = 0, y = 0 along +y, or a CSV file of points; raises UsageError."""
+    if line.endswith(".csv"):
+        if lap:
+            raise UsageError("--lap is for a line of parts: points end where they end")
+        made = _through(_points(Path(line)))
+    else:
+        sections = [_section(part.strip()) for part in line.split(",")]
+        made = Track(sections, (0.0, -LEAD, math.pi / 2) if lap else Track.start, lap)
+    made = replace(made, width=_quantity("--width", width, "m"))
     _check(made)
     return made
 
@@ -103,6 +112,42 @@ def _quantity(option: str, text: str, unit: str) -> float:
     if not 0 < value < _MOST:
         raise UsageError(f"{option}: '{text}' is out of range, expected more than 0 and less than {_MOST} {unit}")
     return value
+
+
+def _points(path: Path) -> list[Point]:
+    """The points of a CSV file, but those that are nearer than cones are to one another."""
+    found: list[Point] = []
+    with path.open(newline="", encoding="utf-8", errors="replace") as file:
+        for number, row in enumerate(csv.reader(line.replace("\0", "?") for line in file), 1):
+            try:
+                x, y = map(float, row)
+            except ValueError:
+                if number > 1:  # names of columns
+                    raise UsageError(f"{path}:{number}: expected two numbers, x and y in m") from None
+                continue
+            if not math.hypot(x, y) < _MOST:
+                raise UsageError(f"{path}:{number}: expected x and y in m, less than {_MOST} m from the middle")
+            if not found or math.dist(found[-1], (x, y)) >= SPACING:
+                found.append((x, y))
+    if len(found) < 2:
+        raise UsageError(f"{path}: expected two or more points, x and y in m, {SPACING} m or more apart")
+    return found
+
+
+def _through(points: Sequence[Point]) -> Track:
+    """A track along points, whose corners are rounded by arcs that end at most in the middle of an edge."""
+    edges = [(math.dist(a, b), math.atan2(b[1] - a[1], b[0] - a[0])) for a, b in pairwise(points)]
+    sections = [Section(edges[0][0] / 2)]
+    for (before, old), (after, new) in pairwise(edges):
+        turn, room = math.remainder(new - old, math.tau), min(before, after) / 2
+        if abs(turn) > math.pi - _TURN_BACK:
+            raise UsageError("--line: the points turn back on themselves, expected a line that can be driven")
+        radius = room / math.tan(abs(turn) / 2) if turn else 0.0
+        arc = Section(radius * abs(turn), turn) if turn else Section(2 * room)
+        sections += [
+            part for part in (Section(before / 2 - room), arc, Section(after / 2 - room)) if part.length > 1e-9
+        ]
+    return Track([*sections, Section(edges[-1][0] / 2)], (*points[0], edges[0][1]))
 
 
 def _check(track: Track) -> None:

@@ -1,6 +1,10 @@
-"""CIDs and subnets in the order of names, so that the same specs get the same numbers on any machine."""
+"""CIDs in the order of names, and subnets by names, so that the same specs get the same numbers on any machine.
+
+A test keeps its subnet whatever else is compiled; if another test has it, the next free one is taken.
+"""
 
 import ipaddress
+import zlib
 from collections.abc import Sequence
 
 from dodo_dsl.application.model import ApplicationSource
@@ -41,18 +45,40 @@ def subnets(network: ipaddress.IPv4Network, length: int = SMALLEST) -> list[str]
     return [str(part) for part in network.subnets(new_prefix=length)] if length >= network.prefixlen else []
 
 
+def _number(name: str, count: int) -> int:
+    return zlib.crc32(name.encode()) % count
+
+
 class Subnets:
-    """Gives subnets of the deployment's network one after the other, and from the first again when it is full."""
+    """Gives subnets of the deployment's network, apart from one another while there are free ones."""
 
     def __init__(self, network: ipaddress.IPv4Network) -> None:
         self._network = network
-        self._next = 0
+        self._taken: set[int] = set()
+        """Subnets of the smallest size, by their order."""
+        self._full: set[int] = set()
+        """Lengths of which no subnet is free."""
 
-    def give(self, containers: int) -> str:
-        """A subnet with room for so many containers as far as the network has it."""
-        length = max(prefix(containers), self._network.prefixlen)
-        size = 1 << (32 - length)
-        begin = -(-self._next // size) * size
-        begin = begin if begin < self._network.num_addresses else 0
-        self._next = begin + size
-        return f"{self._network[begin]}/{length}"
+    def give(self, name: str, containers: int = 1) -> str:
+        """A test's subnet, with room for so many containers as far as the network has it."""
+        network = self._network
+        length = max(prefix(containers), network.prefixlen)
+        index = self._free(_number(name, 1 << (length - network.prefixlen)), length)
+        self._taken.update(_parts(index, length))
+        return f"{ipaddress.IPv4Address(int(network.network_address) + (index << (32 - length)))}/{length}"
+
+    def _free(self, first: int, length: int) -> int:
+        """The first free subnet of a length from ``first`` on; ``first`` if none is free."""
+        count = 1 << (length - self._network.prefixlen)
+        for step in range(0 if length in self._full else count):
+            index = (first + step) % count
+            if self._taken.isdisjoint(_parts(index, length)):
+                return index
+        self._full.add(length)
+        return first
+
+
+def _parts(index: int, length: int) -> range:
+    """The subnets of the smallest size in the ``index``-th one of a length."""
+    size = 1 << (SMALLEST - length)
+    return range(index * size, (index + 1) * size)

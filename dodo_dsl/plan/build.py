@@ -173,7 +173,9 @@ class _Builder:
             isolation=isolated,
             seed=spec.seed,
             cid=self.cid,
-            subnet=self.shared.subnets.give(containers(self.test, self.application)) if isolated == "network" else "",
+            subnet=self.shared.subnets.give(spec.slug, containers(self.test, self.application))
+            if isolated == "network"
+            else "",
             tag=rig.tag if rig else SIMULATION_TAG,
             sandbox_image=self._image("sandbox"),
             services=services,

@@ -14,6 +14,7 @@ from dodo_dsl.spec.deployment import Deployment
 RANGE = Deployment.cids
 
 
+NAMES = [f"sil-{number}" for number in range(400)]
 SMALL = ipaddress.IPv4Network("10.213.0.0/24")
 
 
@@ -39,10 +40,16 @@ def test_host_tests_never_share(isolations: list[str]) -> None:
 
 def test_subnets_are_apart_and_begin_anew() -> None:
     give = Subnets(SMALL).give
-    subnets = [ipaddress.IPv4Network(give(1)) for _ in range(16)]
+    subnets = [ipaddress.IPv4Network(give(name)) for name in NAMES[:16]]
     assert len(set(subnets)) == 16
     assert all(s.subnet_of(SMALL) for s in subnets)
-    assert give(1) == str(subnets[0])
+    assert give(NAMES[16]) == Subnets(SMALL).give(NAMES[16]), "none is free: it has the one of its name"
+
+
+def test_a_test_has_the_same_subnet_whatever_is_compiled_beside_it() -> None:
+    give = Subnets(Deployment.subnets).give
+    few = [give(name) for name in NAMES[:50]]
+    assert few == [Subnets(Deployment.subnets).give(name) for name in NAMES[:50]]
 
 
 @pytest.mark.parametrize(("containers", "length"), [(1, 28), (13, 28), (14, 27), (29, 27), (30, 26), (300, 23)])
@@ -50,7 +57,7 @@ def test_subnets_grow_with_the_application(containers: int, length: int) -> None
     network = ipaddress.IPv4Network("10.213.0.0/16")
     assert prefix(containers) == length
     give = Subnets(network).give
-    found = [ipaddress.IPv4Network(give(containers)) for _ in range(20)]
+    found = [ipaddress.IPv4Network(give(name, containers)) for name in NAMES[:20]]
     assert {part.prefixlen for part in found} == {length}
     assert len(set(found)) == 20 and all(part.subnet_of(network) for part in found)
     assert set(map(str, found)) <= set(subnets(network, length))
@@ -58,6 +65,9 @@ def test_subnets_grow_with_the_application(containers: int, length: int) -> None
 
 def test_large_and_small_subnets_are_apart() -> None:
     give = Subnets(SMALL).give
-    found = [ipaddress.IPv4Network(give(containers)) for containers in (1, 29, 1, 61, 1)]
+    found = [
+        ipaddress.IPv4Network(give(name, containers))
+        for name, containers in zip(NAMES, (1, 29, 1, 61, 1), strict=False)
+    ]
     assert sorted(part.prefixlen for part in found) == [26, 27, 28, 28, 28]
     assert not any(a.overlaps(b) for a, b in itertools.combinations(found, 2))

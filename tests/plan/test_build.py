@@ -29,7 +29,7 @@ def plan(example: str, folder: Path) -> Plan:
 def test_a_plan(tmp_path: Path) -> None:
     found = plan("", tmp_path)
     assert (found.name, found.slug, found.level, found.clock) == ("example", "example", "sil", "realtime")
-    assert (found.timeout_s, found.cid, found.isolation, found.subnet) == (60.0, 128, "network", "10.213.0.0/28")
+    assert (found.timeout_s, found.cid, found.isolation, found.subnet) == (60.0, 128, "network", "10.213.185.240/28")
     assert (found.tag, found.rig, found.lockstep, found.spec) == ("sil", "", None, "tests/example/example.dodo.yml")
     assert [service.name for service in found.services] == ["dodo-recorder", "camera", "vehicle", "pose", "track"]
     assert [service.judge for service in found.services] == [False, False, False, False, True]

@@ -348,6 +348,16 @@ def test_a_deployment_is_written_once_and_keeps_what_there_is(repository: Path) 
     assert (contents(repository), "add to .gitlab-ci.yml" in out) == (everything, False)
 
 
+@pytest.mark.thorough
+def test_a_compose_file_that_is_there_is_named_and_its_stack_left_out(empty: Path) -> None:
+    view = "view: {image: opendlv-vehicle-view}, dec: {image: 'h264decoder:v1'}"
+    (empty / "compose.yaml").write_text(COMPOSE.replace("{app", f"{{{view}, app"))
+    assert "name it in" not in dodo("new", "first")[1]
+    application = yaml.safe_load((empty / "dodo.yml").read_text())["application"]
+    assert application == {"files": ["compose.yaml"], "without": ["view", "dec"]}
+    assert dodo("compile") == (0, "1 test compiled into generated\n", "")
+
+
 def test_an_empty_folder_gets_a_compose_file_to_fill_in(empty: Path) -> None:
     code, out, err = dodo("new", "--deployment")
     assert (code, err, "next: name your services in docker-compose.yml\n" in out) == (0, "", True)
@@ -376,6 +386,7 @@ def test_a_long_name_is_apart_from_its_comment(repository: Path) -> None:
 
 LINES = {
     "parts": "straight 1 m, left 45 deg radius 1 m, right 45 deg radius 80 cm",
+    "points": "points.csv",
     "lap": "straight 2 m, left 180 deg radius 1 m, straight 2 m, left 180 deg radius 1 m",
 }
 
@@ -383,11 +394,12 @@ LINES = {
 @pytest.mark.parametrize("line", LINES)
 @pytest.mark.thorough
 def test_a_map_of_a_centre_line_is_one_that_a_test_takes(repository: Path, line: str) -> None:
+    (repository / "points.csv").write_text("x,y\n1,0\n1,1\n1.05,1.02\n2,2\n4,2\n")
     words = ["--map", "track", "--line", LINES[line], "--width", "60 cm", *["--lap"] * (line == "lap")]
     code, out, err = dodo("new", *words)
     assert (code, err) == (0, "")
     (x, y, yaw) = re.findall(r"x: (\S+) m, y: (\S+) m, yaw: (\S+) deg ", out)[0]
-    assert (x, y, yaw) == ("0", "0", "90")
+    assert (x, y, yaw) == ("1" if line == "points" else "0", "0", "90")
     assert dodo("new", "first")[0] == 0
     spec = repository / "tests/first/first.dodo.yml"
     text = (
