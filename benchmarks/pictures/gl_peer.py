@@ -71,7 +71,7 @@ def block_triangles(entry: BlockEntry, instance: Instance) -> Array:
     colour = np.zeros(3) if isinstance(entry.paint, Path) else np.array(entry.paint)
     for axis in range(3):
         first, second = (a for a in range(3) if a != axis)
-        tile = entry.tile or (size[first], size[second])
+        tile = entry.texture_size or (size[first], size[second])
         for sign in (-0.5, 0.5):
             for a, b in ((0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)):
                 corner = np.zeros(3)

@@ -153,7 +153,7 @@ def entries(file: Path, key: str) -> tuple[str, ...]:
     """
     try:
         is_walls = file.suffix == map_file.WALLS
-        document = map_file.load(file).value if is_walls else json.loads(regular_file.text(file, _MAX_BYTES))
+        document = map_file.document_of(file) if is_walls else json.loads(regular_file.text(file, _MAX_BYTES))
     except OSError as error:
         raise ValueError(f"cannot be read: {error.strerror}") from error
     except (ValueError, RecursionError) as error:

@@ -19,7 +19,6 @@ from dodo_dsl.opendlv.assets.map_file import (
     MapFile,
     ModelEntry,
     OverlayEntry,
-    Vector3,
     find_map,
     read_map,
 )
@@ -167,7 +166,7 @@ class Scene:
     overlays: tuple[OverlayEntry, ...] = ()
 
 
-def _bgr(colour: Vector3) -> Array:
+def _bgr(colour: tuple[float, float, float]) -> Array:
     return np.array(colour[::-1]) * 255.0
 
 
@@ -220,13 +219,13 @@ Textures = dict[tuple[Path, int], Texture]
 
 
 def _cover(entry: BlockEntry, memory: _Budget, known: Textures) -> Colour | Covering:
-    if not isinstance(entry.paint, Path):
-        return (*_bgr(entry.paint).tolist(), 255.0)
-    tile = entry.tile
+    if entry.texture_file is None:
+        return (*_bgr(entry.color or (0.0, 0.0, 0.0)).tolist(), 255.0)
+    tile = entry.texture_size
     repeats = math.ceil(max(entry.dimension) / min(tile)) if tile else 1
-    key = entry.paint, min(repeats, CANVAS)
+    key = entry.texture_file, min(repeats, CANVAS)
     if key not in known:
-        known[key] = Texture(load_picture(entry.paint), repeats)
+        known[key] = Texture(load_picture(entry.texture_file), repeats)
         memory.take(known[key].size)
     return Covering(known[key], tile)
 

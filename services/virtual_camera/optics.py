@@ -55,9 +55,9 @@ class Overlay:
 def load_overlays(entries: tuple[OverlayEntry, ...], width: int, height: int) -> Iterator[Overlay]:
     """All overlays of a map, for pictures of ``width`` and ``height`` pixels; raises InputError."""
     for entry in entries:
-        wide, high = max(1, round(entry.size[0] * width)), max(1, round(entry.size[1] * height))
-        picture = cv2.resize(load_with_alpha(entry.file), (wide, high), interpolation=cv2.INTER_AREA)
-        for x, y in entry.places:
+        wide, high = max(1, round(entry.dimension[0] * width)), max(1, round(entry.dimension[1] * height))
+        picture = cv2.resize(load_with_alpha(entry.texture_file), (wide, high), interpolation=cv2.INTER_AREA)
+        for x, y, *_ in entry.instances:
             yield Overlay(np.asarray(picture, np.uint8), round(x * width), round(y * height), (width, height))
 
 

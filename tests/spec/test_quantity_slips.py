@@ -8,21 +8,11 @@ from hypothesis import strategies as st
 
 from dodo_dsl.spec.quantity import UNITS, QuantityError, convert
 
-MENDED = [
-    ("10 hz", "Hz", "10 Hz"),
-    ("1gb", "B", "1GB"),
-    ("1 kb", "B", "1 kB"),
-]
-
-
-@pytest.mark.parametrize(("text", "unit", "mended"), MENDED)
-def test_a_value_with_exactly_one_fix(text: str, unit: str, mended: str) -> None:
+@pytest.mark.parametrize(("text", "unit", "meant"), [("10 hz", "Hz", "Hz"), ("1gb", "B", "GB"), ("1 kb", "B", "kB")])
+def test_a_unit_in_other_letters_is_named(text: str, unit: str, meant: str) -> None:
     with pytest.raises(QuantityError) as problem:
         convert(text, unit)
-    assert problem.value.fix is not None
-    assert problem.value.hint
-    assert problem.value.fix.mended(text) == mended
-    convert(mended, unit)
+    assert problem.value.hint == f"did you mean '{meant}'?"
 
 
 NUMBERS = st.sampled_from(("1", "-1", "1,5", "1.5", ".5", "1e3", "1.000,5", "+2", ",", "", "\u22121", "0x1"))

@@ -65,7 +65,7 @@ def _map(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
                 paints += [p for p, _ in mesh_text.paints(file, mesh, read.path.parent)] if is_plain else ()
         except InputError as error:
             yield error
-    for paint in dict.fromkeys((*paints, *(overlay.file for overlay in read.overlays))):
+    for paint in dict.fromkeys((*paints, *(overlay.texture_file for overlay in read.overlays))):
         if isinstance(paint, Path):
             yield from _picture(paint)
 
@@ -86,13 +86,10 @@ def _obstacles(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError
     file = map_file.find_map(path)
     if settings.get("bodies") == "true" and not {*map(str, map_file.read_frames(path))} - {settings["frame-id"]}:
         yield InputError(file, map_file.NO_BODIES, hint='give the model of another vehicle "frames": [1]')
-    try:
-        found = list(map_file.unread_keys(map_file.load(file)))
-    except InputError as error:
-        found = [error]
-    yield from found
-    if all(problem.is_slip for problem in found):
-        yield from _raised(lambda: map_file.read_obstacles(path))
+    if found := _raised(lambda: map_file.read_obstacles(path)):
+        yield from found
+    else:
+        yield from map_file.unread_keys(file, map_file.document_of(file))
 
 
 def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
@@ -107,7 +104,6 @@ def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
         yield error
         return
     yield from truth_file.corners(path)
-    yield from truth_file.unread_keys(path)
     labels = {label for boxes in pictures.values() for label, _ in boxes}
     missing = [name for name in settings["classes"].split(",") if name and name not in labels]
     known = truth_file.categories(path) if missing else ()

@@ -5,51 +5,88 @@ Models and textures are not loaded yet.
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar
+
+import msgspec
+from msgspec import Meta, Struct
 
 from dodo_dsl.opendlv.assets import mesh_text
-from dodo_dsl.opendlv.assets.json_file import MAX_NUMBER, Node, read_bytes, unread
+from dodo_dsl.opendlv.assets.json_file import (
+    MAX_NUMBER,
+    Number,
+    Text,
+    converted,
+    entries,
+    load,
+    near,
+    read_bytes,
+    unread,
+)
 from dodo_dsl.opendlv.assets.problem import InputError
 
-MAX_INSTANCES = 100_000
-MAX_BLOCKS = 500
-_TURN = 6.3
-"""rad"""
+MAX_INSTANCES, MAX_BLOCKS = 100_000, 500
 MAX_FRAMES = 100
-MAX_STAMP = 2**32 - 1
+MAX_OVERLAYS = 50
+"""Places of overlays, each of which takes the memory of an image."""
+MAX_LINES = 10_000
+"""Of all obstacles of a map, to each of which evaluators measure the distance."""
 FRAME_TURN = math.pi / 2
 """A model at a frame is turned by the frame's yaw and this, in rad about z: it looks along its own -y."""
 NO_BODIES = "no model of the map has 'frames' of other sender stamps than the vehicle's"
-MAX_OVERLAYS = 50
-"""Places of overlays, each of which takes the memory of an image."""
+LOWEST, HIGHEST = 0.01, 0.15
+"""m above the ground: a block that is lower is driven over; the Kiwi car is as high."""
 
-Vector3 = tuple[float, float, float]
-Paint = Vector3 | Path
+Positive = Annotated[float, Meta(gt=0, le=MAX_NUMBER)]
+Part = Annotated[float, Meta(ge=0, le=1)]
+Share = Annotated[float, Meta(gt=0, le=1)]
+Stamps = Annotated[tuple[Annotated[int, Meta(ge=0, lt=2**32)], ...], Meta(max_length=MAX_FRAMES)]
+Paint = tuple[Part, Part, Part] | Path
 """A colour as r, g, b from 0 to 1, or the file of a texture."""
+Line = tuple[tuple[float, float], tuple[float, float]]
+Outline = tuple[tuple[float, float], ...]
+Report = Callable[[InputError], None]
 
 
-@dataclass(frozen=True)
-class Instance:
+class Instance(NamedTuple):
     """Where a thing stands: its position in m, its OpenDLV angle in rad (0 is half a turn, then clockwise)."""
 
-    position: Vector3
-    angle: float
+    x: Number
+    y: Number
+    z: Number
+    angle: Number
+
+    @property
+    def position(self) -> tuple[float, float, float]:
+        return self.x, self.y, self.z
 
 
-@dataclass(frozen=True)
-class ModelEntry:
+class _Painted(Struct, frozen=True, rename="camel", kw_only=True):
+    name: Text
+    color: tuple[Part, Part, Part] | None = None
+    texture_file: Path | None = None
+    instances: tuple[Instance, ...] = ()
+
+    @property
+    def paint(self) -> Paint | None:
+        return self.texture_file or self.color
+
+
+class ModelEntry(_Painted, frozen=True, rename="camel", kw_only=True):
     """An OBJ file, its paint, and where copies of it stand; one more is at the frame of each sender stamp.
 
     Without paint it has the materials of its file.
     """
 
-    name: str
     file: Path
-    paint: Paint | None
-    instances: tuple[Instance, ...]
-    frames: tuple[int, ...] = ()
+    frames: Stamps = ()
+
+    def __post_init__(self) -> None:
+        if not self.paint and b"usemtl" not in read_bytes(self.file):
+            raise ValueError("'color' or 'textureFile' is missing")
+        if len(set(self.frames)) < len(self.frames):
+            raise ValueError("a sender stamp appears twice among its frames")
 
     def footprint(self) -> list[tuple[float, float]]:
         """The model's convex outline from above, at a frame at the origin that looks along x; raises InputError."""
@@ -57,29 +94,37 @@ class ModelEntry:
         return [(cos * x - sin * y, sin * x + cos * y) for x, y in mesh_text.outline(self.file)]
 
 
-@dataclass(frozen=True)
-class BlockEntry:
-    """A box, ``dimension`` in m and centred on each instance; ``tile`` is the size of its texture in m."""
+class BlockEntry(_Painted, frozen=True, rename="camel", kw_only=True):
+    """A box, ``dimension`` in m and centred on each instance; ``texture_size`` is that of its texture in m."""
 
-    name: str
-    dimension: Vector3
-    paint: Paint
-    tile: tuple[float, float] | None
-    instances: tuple[Instance, ...]
+    dimension: tuple[Positive, Positive, Positive]
+    texture_size: tuple[Positive, Positive] | None = None
 
-
-@dataclass(frozen=True)
-class OverlayEntry:
-    """An image laid over the camera's: its size and positions (upper left corners) as fractions of that image."""
-
-    name: str
-    file: Path
-    size: tuple[float, float]
-    places: tuple[tuple[float, float], ...]
+    def __post_init__(self) -> None:
+        if not self.paint:
+            raise ValueError("'color' or 'textureFile' is missing")
 
 
-@dataclass(frozen=True)
-class MapFile:
+class OverlayEntry(Struct, frozen=True, rename="camel"):
+    """An image laid over the camera's: its size and positions (upper left corners) as fractions of that image.
+
+    OpenDLV reads the first two numbers of a position; maps often have four, as elsewhere.
+    """
+
+    name: Text
+    dimension: tuple[Share, Share]
+    texture_file: Path
+    instances: tuple[Annotated[tuple[Number, ...], Meta(min_length=2, max_length=4)], ...] = ()
+
+
+class Obstacle(Struct, frozen=True):
+    """Lines on the ground, from x1, y1 to x2, y2 in m."""
+
+    lines: Annotated[list[tuple[Number, Number, Number, Number]], Meta(min_length=1)]
+    name: Text | None = None
+
+
+class MapFile(NamedTuple):
     """Everything to draw; things without instances are left out."""
 
     path: Path
@@ -88,92 +133,15 @@ class MapFile:
     overlays: tuple[OverlayEntry, ...] = ()
 
 
-def _triple(node: Node, names: str) -> Vector3:
-    a, b, c = node.numbers(names)
-    return a, b, c
-
-
-def _colour(node: Node) -> Vector3:
-    colour = _triple(node, "r g b")
-    if not all(0.0 <= part <= 1.0 for part in colour):
-        node.fail("the numbers [r, g, b] between 0 and 1")
-    return colour
-
-
-def _paint(node: Node) -> Paint:
-    texture, colour = node.member("textureFile"), node.member("color")
-    if texture is not None:
-        return texture.resource()
-    return _colour(colour) if colour is not None else node.lacks("'color' or 'textureFile'")
-
-
-def _instances(node: Node) -> tuple[Instance, ...]:
-    rows = [item.numbers("x y z angle") for item in node.items("instances")]
-    return tuple(Instance((x, y, z), angle) for x, y, z, angle in rows)
-
-
-def _frames(node: Node) -> tuple[int, ...]:
-    found: list[int] = []
-    items = list(node.items("frames"))
-    if len(items) > MAX_FRAMES:
-        raise InputError(
-            node.file, f"{len(items)} frames of a model, expected at most {MAX_FRAMES}", f"{node.place}.frames"
-        )
-    for item in items:
-        if isinstance(item.value, bool) or not isinstance(item.value, int) or not 0 <= item.value <= MAX_STAMP:
-            item.fail(f"a sender stamp, a whole number from 0 to {MAX_STAMP}")
-        if item.value in found:
-            raise InputError(item.file, f"the sender stamp {item.value} appears twice", item.place, hint="remove one")
-        found.append(item.value)
-    return tuple(found)
-
-
-def _model(node: Node) -> ModelEntry | None:
-    instances, frames = _instances(node), _frames(node)
-    if not instances and not frames:
-        return None
-    file = node.required("file").resource()
-    has_materials = not (_has(node, "color") or _has(node, "textureFile")) and b"usemtl" in read_bytes(file)
-    paint = None if has_materials else _paint(node)
-    return ModelEntry(node.required("name").text(), file, paint, instances, frames)
-
-
-def _positive(node: Node, names: str) -> tuple[float, ...]:
-    numbers = node.numbers(names)
-    if min(numbers) <= 0.0:
-        node.fail(f"the numbers [{', '.join(names.split())}], all greater than 0")
-    return numbers
-
-
-def _block(node: Node) -> BlockEntry | None:
-    instances = _instances(node)
-    if not instances:
-        return None
-    width, depth, height = _positive(node.required("dimension"), "x y z")
-    size = node.member("textureSize")
-    tile = None
-    if size is not None:
-        along, up = _positive(size, "width height")
-        tile = (along, up)
-    dimension = (width, depth, height)
-    return BlockEntry(node.required("name").text(), dimension, _paint(node), tile, instances)
-
-
-def _overlay(node: Node) -> OverlayEntry | None:
-    rows = [item.numbers(_names(item, "x y")) for item in node.items("instances")]
-    if not rows:
-        return None
-    wide, high = _positive(node.required("dimension"), "width height")
-    if max(wide, high) > 1.0:
-        node.required("dimension").fail("the numbers [width, height], fractions of the image up to 1")
-    file = node.required("textureFile").resource()
-    places = tuple((row[0], row[1]) for row in rows)
-    return OverlayEntry(node.required("name").text(), file, (wide, high), places)
-
-
-def _names(item: Node, names: str) -> str:
-    """OpenDLV reads the first two numbers of an overlay's position; maps often write four as elsewhere."""
-    return "x y z angle" if isinstance(item.value, list) and len(item.value) == 4 else names
+_LISTS: dict[str, type[Struct]] = {
+    "model": ModelEntry,
+    "block": BlockEntry,
+    "overlay": OverlayEntry,
+    "obstacles": Obstacle,
+}
+Kind = TypeVar("Kind", bound=Struct)
+WALLS = ".txt"
+"""The suffix of a map of older simulations, which has walls alone."""
 
 
 def find_map(path: Path) -> Path:
@@ -181,20 +149,15 @@ def find_map(path: Path) -> Path:
     return path / "map.json" if path.is_dir() else path
 
 
-WALLS = ".txt"
-"""The suffix of a map of older simulations, which has walls alone."""
-_WALL = "a wall x1,y1,x2,y2; in m"
-
-
-def load(file: Path) -> Node:
+def document_of(file: Path) -> Any:
     """The document of a map; walls ``x1,y1,x2,y2;`` of a text file are its obstacles. Raises InputError."""
     if file.suffix != WALLS:
-        return Node.load(file)
+        return load(file)
     lines = enumerate(read_bytes(file).decode(errors="replace").splitlines(), 1)
     walls = [_wall(file, wall, number) for number, line in lines for wall in line.split(";") if wall.strip()]
     if not walls:
-        raise InputError(file, f"the file is empty, expected {_WALL}", line=1)
-    return Node(file, "$", {"obstacles": [{"lines": [wall]} for wall in walls]})
+        raise InputError(file, "the file is empty, expected a wall x1,y1,x2,y2; in m", line=1)
+    return {"obstacles": [{"lines": [wall]} for wall in walls]}
 
 
 def _wall(file: Path, text: str, line: int) -> list[float]:
@@ -203,14 +166,91 @@ def _wall(file: Path, text: str, line: int) -> list[float]:
     except ValueError:
         wall = []
     if len(wall) != 4 or not all(abs(value) <= MAX_NUMBER for value in wall):
-        raise InputError(file, f"expected {_WALL}, found '{text.strip()[:60]}'", line=line, hint="as -2,0,2,0;")
+        raise InputError(file, f"expected a wall x1,y1,x2,y2; in m, found '{text.strip():.60}'", line=line)
     return wall
 
 
 def read_map(path: Path) -> MapFile:
     """Reads and checks the map in a folder (or a ``map.json``); InputError names the file and the JSON path."""
     file = find_map(path)
-    return _collected(file, load(file), _raised)
+    return _collected(file, document_of(file), _raised)
+
+
+def problems(path: Path) -> tuple[MapFile | None, list[InputError]]:
+    """What can be drawn of a map, None for what is not a map, and all that is wrong with it."""
+    file, found = find_map(path), list[InputError]()
+    try:
+        document = converted(file, document_of(file), dict)
+    except InputError as error:
+        return None, [error]
+    read = _collected(file, document, found.append)
+    return read, [*found, *unread_keys(file, document)]
+
+
+def unread_keys(file: Path, document: object) -> Iterator[InputError]:
+    """Keys of a map that nothing reads."""
+    return unread(file, document, _LISTS)
+
+
+def _collected(file: Path, document: object, report: Report) -> MapFile:
+    models = _last_of_each_frame(_entries(file, document, "model", ModelEntry, report))
+    blocks = _entries(file, document, "block", BlockEntry, report)
+    overlays = _entries(file, document, "overlay", OverlayEntry, report)
+    for key, what, count, limit in (
+        ("model", "instances", sum(len(m.instances) for m in models), MAX_INSTANCES),
+        ("model", "frames", sum(len(m.frames) for m in models), MAX_FRAMES),
+        ("block", "instances", sum(len(b.instances) for b in blocks), MAX_BLOCKS),
+        ("overlay", "instances", sum(len(o.instances) for o in overlays), MAX_OVERLAYS),
+    ):
+        if count > limit:
+            report(InputError(file, f"{count} {what} of {key}s, expected at most {limit}", f"$.{key}"))
+    return MapFile(file, models, blocks, overlays)
+
+
+def _last_of_each_frame(models: tuple[ModelEntry, ...]) -> tuple[ModelEntry, ...]:
+    last = {frame: index for index, model in enumerate(models) for frame in model.frames}
+    kept = (
+        msgspec.structs.replace(model, frames=tuple(frame for frame in model.frames if last[frame] == index))
+        for index, model in enumerate(models)
+    )
+    return tuple(model for model in kept if model.instances or model.frames)
+
+
+def _entries(file: Path, document: object, key: str, kind: type[Kind], report: Report) -> tuple[Kind, ...]:
+    """The entries of a list that stand somewhere and can be read; what is wrong with the others is reported."""
+    found: list[Kind] = []
+    is_wanted = _stands if kind is not Obstacle else lambda _: True
+    for entry in entries(file, document, key, kind, partial(_resource, file.parent.resolve()), is_wanted):
+        if isinstance(entry, InputError):
+            report(entry)
+        else:
+            found.append(entry)
+    return tuple(found)
+
+
+def _stands(entry: object) -> bool:
+    """Not so what is nowhere, whose files need not be there."""
+    return not isinstance(entry, dict) or any(entry.get(key, []) != [] for key in ("instances", "frames"))
+
+
+def _raised(error: InputError) -> None:
+    raise error
+
+
+def _resource(folder: Path, _kind: type, name: object) -> Path:
+    """The file that a map names; ValueError when it is not there or outside the map's folder."""
+    try:
+        path = (folder / str(name)).resolve()
+        is_file = path.is_file()
+    except (ValueError, OSError, RuntimeError):
+        raise ValueError("expected the path of a file") from None
+    if not path.is_relative_to(folder):
+        hint = "copy it there: the map's folder goes with the test"
+        raise ValueError("expected a file inside the map's folder, and no symbolic link out of it", hint)
+    if not is_file or not isinstance(name, str):
+        beside = [each.name for each in path.parent.iterdir() if each.is_file()] if path.parent.is_dir() else []
+        raise ValueError("expected a regular file in the map's folder", near(path.name, beside))
+    return path
 
 
 def bodies(models: Sequence[ModelEntry], own: int) -> dict[int, tuple[str, ModelEntry]]:
@@ -223,122 +263,19 @@ def bodies(models: Sequence[ModelEntry], own: int) -> dict[int, tuple[str, Model
     }
 
 
+class _Framed(Struct):
+    frames: Stamps = ()
+
+
 def read_frames(path: Path) -> tuple[int, ...]:
     """The sender stamps at which a map has models, in order; none for a file that another check refuses."""
-    file, found = find_map(path), set[int]()
+    file = find_map(path)
     try:
-        if b'"frames"' in read_bytes(file):
-            for model in Node.load(file).items("model"):
-                found.update(_frames(model))
+        models = list(entries(file, document_of(file), "model", _Framed))
     except InputError:
         return ()
+    found = {stamp for model in models if isinstance(model, _Framed) for stamp in model.frames}
     return tuple(sorted(found)) if len(found) <= MAX_FRAMES else ()
-
-
-def problems(path: Path) -> tuple[MapFile | None, list[InputError]]:
-    """What can be drawn of a map, None for what is not a map, and all that is wrong with it."""
-    file, found = find_map(path), list[InputError]()
-    try:
-        root = load(file)
-        read = _collected(file, root, found.append)
-    except InputError as error:
-        return None, [error]
-    found.extend(unread_keys(root))
-    found.extend(_degrees(read, root))
-    return read, found
-
-
-def unread_keys(root: Node) -> Iterator[InputError]:
-    """Keys of a map that nothing reads; errors where those of an obstacle are meant."""
-    yield from unread([root], _KEYS, ("obstacles",))
-    for key, known in _KEYS.items():
-        yield from unread(_listed(root, key), known, known if key == "obstacles" else ())
-
-
-def _listed(root: Node, key: str) -> Iterator[Node]:
-    """The entries of a list; none where it is not a list, which is reported elsewhere."""
-    value = root.value.get(key) if isinstance(root.value, dict) else None
-    yield from root.items(key) if isinstance(value, list) else ()
-
-
-def _has(entry: Node, key: str) -> bool:
-    return isinstance(entry.value, dict) and key in entry.value
-
-
-def _degrees(read: MapFile, root: Node) -> Iterator[InputError]:
-    """The first angle of more than a turn, which is hardly in radians."""
-    for key in ("model", "block"):
-        for item in _listed(root, key):
-            rows = item.value.get("instances") if isinstance(item.value, dict) else None
-            for index, row in enumerate(rows if isinstance(rows, list) else ()):
-                angle = row[3] if isinstance(row, list) and len(row) == 4 else 0
-                if isinstance(angle, int | float) and _TURN < abs(angle) <= MAX_NUMBER:
-                    place = f"{item.place}.instances[{index}][3]"
-                    what = f"the angle {angle:g} is more than a turn, expected radians"
-                    hint = f"{angle:g} degrees are {math.radians(angle):.5g} rad"
-                    yield InputError(read.path, what, place, hint=hint, is_slip=True)
-                    return
-
-
-_KEYS = {
-    "model": ("name", "file", "color", "textureFile", "instances", "frames"),
-    "block": ("name", "dimension", "color", "textureFile", "textureSize", "instances"),
-    "overlay": ("name", "dimension", "textureFile", "instances"),
-    "obstacles": ("name", "lines"),
-}
-"""What OpenDLV's maps have in each list."""
-Entry = TypeVar("Entry")
-Report = Callable[[InputError], None]
-
-
-def _raised(error: InputError) -> None:
-    raise error
-
-
-def _collected(file: Path, root: Node, report: Report) -> MapFile:
-    root.member("model")
-    models = _last_of_each_frame(_entries(root, "model", _model, report))
-    blocks = _entries(root, "block", _block, report)
-    overlays = _entries(root, "overlay", _overlay, report)
-    for key, what, count, limit in (
-        ("model", "instances", sum(len(m.instances) for m in models), MAX_INSTANCES),
-        ("model", "frames", sum(len(m.frames) for m in models), MAX_FRAMES),
-        ("block", "instances", sum(len(b.instances) for b in blocks), MAX_BLOCKS),
-        ("overlay", "instances", sum(len(o.places) for o in overlays), MAX_OVERLAYS),
-    ):
-        if count > limit:
-            report(InputError(file, f"{count} {what} of {key}s, expected at most {limit}", f"$.{key}"))
-    return MapFile(file, models, blocks, overlays)
-
-
-def _last_of_each_frame(models: tuple[ModelEntry, ...]) -> tuple[ModelEntry, ...]:
-    last = {frame: index for index, model in enumerate(models) for frame in model.frames}
-    kept = (
-        replace(model, frames=tuple(frame for frame in model.frames if last[frame] == index)) if model.frames else model
-        for index, model in enumerate(models)
-    )
-    return tuple(model for model in kept if model.instances or model.frames)
-
-
-def _entries(root: Node, key: str, read: Callable[[Node], Entry | None], report: Report) -> tuple[Entry, ...]:
-    """The entries of a list that can be read; the others are reported."""
-    found: list[Entry] = []
-    try:
-        for item in root.items(key):
-            try:
-                entry = read(item)
-            except InputError as error:
-                report(error)
-            else:
-                found.extend([] if entry is None else [entry])
-    except InputError as error:
-        report(error)
-    return tuple(found)
-
-
-Line = tuple[tuple[float, float], tuple[float, float]]
-MAX_LINES = 10_000
-"""Of all obstacles of a map, to each of which evaluators measure the distance."""
 
 
 def read_obstacles(path: Path) -> dict[str, list[Line]]:
@@ -346,13 +283,24 @@ def read_obstacles(path: Path) -> dict[str, list[Line]]:
 
     Obstacles of one name are one; one without a name is named by its number. Raises InputError.
     """
-    root = load(path if path.suffix in (".json", WALLS) else path / "map.json")
-    require_few_lines(root)
-    found: dict[str, list[Line]] = {}
-    for number, entry in enumerate(root.items("obstacles"), 1):
-        name, lines = _named_lines(entry, numbered(number))
-        found.setdefault(name, []).extend(lines)
+    file = find_map(path)
+    document, found = converted(file, document_of(file), dict), dict[str, list[Line]]()
+    if isinstance(listed := document.get("obstacles"), list):
+        document = {"obstacles": [*map(_with_list, listed)]}
+    for number, obstacle in enumerate(_entries(file, document, "obstacles", Obstacle, _raised), 1):
+        lines = [((x1, y1), (x2, y2)) for x1, y1, x2, y2 in obstacle.lines]
+        found.setdefault(obstacle.name or numbered(number), []).extend(lines)
+    if (count := sum(map(len, found.values()))) > MAX_LINES:
+        what, hint = f"{count} lines of obstacles, expected at most {MAX_LINES}", "write long lines, and fewer of them"
+        raise InputError(file, what, "$.obstacles", hint=hint)
     return found
+
+
+def _with_list(obstacle: Any) -> Any:
+    """An obstacle whose only line has a list around it, which maps may leave out."""
+    lines = obstacle.get("lines") if isinstance(obstacle, dict) else None
+    is_one = isinstance(lines, list) and lines and not isinstance(lines[0], list)
+    return {**obstacle, "lines": [lines]} if is_one else obstacle
 
 
 def numbered(number: int) -> str:
@@ -360,14 +308,10 @@ def numbered(number: int) -> str:
     return f"obstacle-{number}"
 
 
-LOWEST, HIGHEST = 0.01, 0.15
-"""m above the ground: a block that is lower is driven over; the Kiwi car is as high."""
-Outline = tuple[tuple[float, float], ...]
-
-
-def read_footprints(path: Path, height: float = HIGHEST) -> dict[str, list[Outline]]:
+def read_footprints(path: Path, height: float) -> dict[str, list[Outline]]:
     """As ``footprints``, of the map in a folder or of a ``map.json``; raises InputError."""
-    return footprints(_entries(load(find_map(path)), "block", _block, _raised), height)
+    file = find_map(path)
+    return footprints(_entries(file, document_of(file), "block", BlockEntry, _raised), height)
 
 
 def footprints(blocks: Iterable[BlockEntry], height: float = HIGHEST) -> dict[str, list[Outline]]:
@@ -378,40 +322,13 @@ def footprints(blocks: Iterable[BlockEntry], height: float = HIGHEST) -> dict[st
     found: dict[str, list[Outline]] = {}
     for block in blocks:
         reach = block.dimension[2] / 2
-        standing = [i for i in block.instances if i.position[2] + reach > LOWEST and i.position[2] - reach < height]
+        standing = [i for i in block.instances if i.z + reach > LOWEST and i.z - reach < height]
         found.setdefault(block.name, []).extend(_outline(block, instance) for instance in standing)
     return found
 
 
 def _outline(block: BlockEntry, instance: Instance) -> Outline:
     cos, sin = math.cos(math.pi - instance.angle), math.sin(math.pi - instance.angle)
-    (x, y, _), along, across = instance.position, block.dimension[0] / 2, block.dimension[1] / 2
-    signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    corners = ((f * along, s * across) for f, s in signs)
-    return tuple((x + u * cos - v * sin, y + u * sin + v * cos) for u, v in corners)
-
-
-def require_few_lines(root: Node) -> None:
-    """Raises InputError for more lines than a map may have."""
-    lines = [o.value.get("lines") for o in root.items("obstacles") if isinstance(o.value, dict)]
-    if (count := sum(len(each) for each in lines if isinstance(each, list))) > MAX_LINES:
-        what = f"{count} lines of obstacles, expected at most {MAX_LINES}"
-        raise InputError(root.file, what, "$.obstacles", hint="write long lines in the place of many short ones")
-
-
-def _named_lines(entry: Node, default: str) -> tuple[str, list[Line]]:
-    name = entry.member("name")
-    text = name.text() if name else default
-    if name and text != text.strip():
-        hint = f'write "{text.strip()}"' if text.strip() else ""
-        name.fail("a name without blanks around it, as a test finds it", hint)
-    lines = entry.required("lines")
-    if not isinstance(lines.value, list) or not lines.value:
-        lines.fail("a list of lines [x1, y1, x2, y2]")
-    rows = [lines] if not isinstance(lines.value[0], list) else entry.items("lines")
-    return text, [_line(row) for row in rows]
-
-
-def _line(node: Node) -> Line:
-    x1, y1, x2, y2 = node.numbers("x1 y1 x2 y2")
-    return (x1, y1), (x2, y2)
+    along, across = block.dimension[0] / 2, block.dimension[1] / 2
+    corners = ((f * along, s * across) for f, s in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
+    return tuple((instance.x + u * cos - v * sin, instance.y + u * sin + v * cos) for u, v in corners)

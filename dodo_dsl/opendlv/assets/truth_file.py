@@ -3,28 +3,55 @@
 import difflib
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from dodo_dsl.opendlv.assets.json_file import Node, unread
+from msgspec import Meta, Struct
+
+from dodo_dsl.opendlv.assets.json_file import converted, load
 from dodo_dsl.opendlv.assets.problem import InputError
 
 Frames = Literal["one", "sample-time", "number"]
 Area = tuple[float, float, float, float]
 """x, y, width and height as fractions of the image."""
-
-
-LARGEST = 2**63
-_FAR, _FARTHER = 1.1, 1.5
-"""Times the image, up to which boxes may go on outside it: those that could be corners, and others."""
 PREFIX = "color:"
-_KEYS: Mapping[str, frozenset[str]] = {
-    "": frozenset(("info", "licenses", "images", "annotations", "categories")),
-    "images": frozenset(("id", "width", "height", "file_name", "license", "sample_time"))
-    | {"flickr_url", "coco_url", "date_captured"},
-    "annotations": frozenset(("id", "image_id", "category_id", "segmentation", "area", "bbox", "iscrowd")),
-    "categories": frozenset(("id", "name", "supercategory")),
-}
-"""The format's keys at the top and in the entries of each list, and DoDo's ``sample_time``."""
+_FAR = 1.1
+"""Times the image, beyond which a box ends that is written as two corners."""
+
+Whole = Annotated[int, Meta(ge=0, le=2**63 - 1)]
+Pixels = Annotated[float, Meta(ge=-(2**53), le=2**53)]
+
+
+class Picture(Struct, frozen=True):
+    """An image, its size in pixels and, of a recording, its sample time (us)."""
+
+    id: Whole
+    width: Annotated[int, Meta(ge=1, lt=2**31)]
+    height: Annotated[int, Meta(ge=1, lt=2**31)]
+    sample_time: Whole | None = None
+
+
+class Category(Struct, frozen=True):
+    """A class."""
+
+    id: Whole
+    name: Annotated[str, Meta(pattern=r"^(?!\s*(color:)?\s*$)")]
+
+
+class Annotation(Struct, frozen=True):
+    """The box of one object: x, y of the upper left corner, width and height in pixels."""
+
+    image_id: Whole
+    category_id: Whole
+    bbox: tuple[Pixels, Pixels, Pixels, Pixels]
+    iscrowd: Any = 0
+
+
+class Truth(Struct, frozen=True):
+    """What is read of a file, others of its keys are not."""
+
+    images: list[Picture]
+    annotations: list[Annotation]
+    categories: list[Category]
 
 
 class NoBoxes(InputError):
@@ -38,41 +65,34 @@ def plain(label: str) -> str:
 
 def read(path: Path, frames: Frames) -> dict[int, list[tuple[str, Area]]]:
     """The classes and boxes of each image, by what distinguishes images; raises InputError."""
-    root = Node.load(path)
-    images = _by_id(root, "images")
-    names = {number: _name(entry) for number, entry in _by_id(root, "categories").items()}
+    truth = converted(path, load(path), Truth)
+    images, names = _by_id(path, "images", truth.images), _by_id(path, "categories", truth.categories)
     boxes: dict[int, list[tuple[str, Area]]] = {number: [] for number in images}
-    for entry in _objects(root, "annotations"):
-        image, category = _known(entry, "image_id", images), _known(entry, "category_id", names)
-        boxes[image].append((names[category], _box(entry, images[image])))
-    if not any(boxes.values()):
+    for index, entry in enumerate(truth.annotations):
+        place = f"$.annotations[{index}]"
+        for key, number, known in (("image_id", entry.image_id, images), ("category_id", entry.category_id, names)):
+            if number not in known:
+                raise InputError(path, f"no entry has the id {number}", f"{place}.{key}")
+        boxes[entry.image_id].append(
+            (plain(names[entry.category_id].name), _box(path, entry, images[entry.image_id], place))
+        )
+    if not truth.annotations:
         raise NoBoxes(path, "no boxes, expected at least one", "$.annotations")
     keys = _keys(images, frames, path)
     return {keys[number]: found for number, found in boxes.items()}
 
 
 def corners(path: Path) -> Iterator[InputError]:
-    """The first box that ends far outside its image, as one does that is written as two corners; the file is read."""
-    root = Node.load(path)
-    images = _by_id(root, "images")
-    for entry in _objects(root, "annotations"):
-        image, (x, y, wide, high) = images[entry.value["image_id"]].value, entry.value["bbox"]
-        beyond = max((x + wide) / image["width"], (y + high) / image["height"])
-        is_corners = x < wide <= image["width"] and y < high <= image["height"]
-        if beyond > (_FAR if is_corners else _FARTHER):
-            what = f"the box ends at {x + wide:g}, {y + high:g}, outside its image of {image['width']} x "
-            what += f"{image['height']} pixels"
-            hint = "a box is [x, y, width, height]"
-            hint += f": the one with these corners is {[x, y, wide - x, high - y]}" if is_corners else ""
-            yield InputError(path, what, f"{entry.place}.bbox", hint=hint, is_slip=True)
+    """The first box that ends outside its image, as one does that is written as two corners; the file is read."""
+    truth = converted(path, load(path), Truth)
+    images = {image.id: image for image in truth.images}
+    for index, entry in enumerate(truth.annotations):
+        image, (x, y, wide, high) = images[entry.image_id], entry.bbox
+        if max((x + wide) / image.width, (y + high) / image.height) > _FAR and x < wide and y < high:
+            what = f"the box ends at {x + wide:g}, {y + high:g}, outside its image of {image.width} x {image.height}"
+            hint = f"a box is [x, y, width, height]: the one with these corners is {[x, y, wide - x, high - y]}"
+            yield InputError(path, what, f"$.annotations[{index}].bbox", hint=hint, is_slip=True)
             return
-
-
-def unread_keys(path: Path) -> Iterator[InputError]:
-    """Keys that are none of the format, each once; the file is read."""
-    root = Node.load(path)
-    for kind, known in _KEYS.items():
-        yield from unread(root.items(kind) if kind else [root], sorted(known))
 
 
 def no_box(name: str, labels: Collection[str]) -> str:
@@ -84,76 +104,44 @@ def no_box(name: str, labels: Collection[str]) -> str:
 
 def categories(path: Path) -> list[str]:
     """The classes that a file names, whether a box has them or not; raises InputError."""
-    return [_name(entry) for entry in _objects(Node.load(path), "categories")]
+    return [plain(entry.name) for entry in converted(path, load(path), Truth).categories]
 
 
-def _objects(root: Node, name: str) -> Iterator[Node]:
-    root.required(name)
-    for entry in root.items(name):
-        if not isinstance(entry.value, dict):
-            entry.fail("an object")
-        yield entry
+Entry = TypeVar("Entry", Picture, Category)
 
 
-def _by_id(root: Node, name: str) -> dict[int, Node]:
-    entries = list(_objects(root, name))
-    found = {_whole(entry, "id"): entry for entry in entries}
+def _by_id(path: Path, key: str, entries: list[Entry]) -> dict[int, Entry]:
+    found = {entry.id: entry for entry in entries}
     if len(found) < len(entries):
-        raise InputError(root.file, "two have the same id", f"$.{name}")
+        raise InputError(path, "two have the same id", f"$.{key}")
     return found
 
 
-def _keys(images: Mapping[int, Node], frames: Frames, path: Path) -> dict[int, int]:
+def _keys(images: Mapping[int, Picture], frames: Frames, path: Path) -> dict[int, int]:
     """Each image's key, by its id."""
     if frames == "number":
         return {number: number for number in images}
     if frames == "sample-time":
-        keys = {number: _whole(entry, "sample_time") for number, entry in images.items()}
+        keys = {number: image.sample_time for number, image in images.items() if image.sample_time is not None}
+        if len(keys) < len(images):
+            raise InputError(path, "an image has no sample_time, a whole number of us", "$.images")
         if len(set(keys.values())) < len(keys):
             raise InputError(path, "two have the same sample_time", "$.images")
         return keys
     if len(images) > 1:
-        what = f"has {len(images)} images, expected one for all frames; see truth-frames"
-        raise InputError(path, what, line=1)
+        raise InputError(path, f"has {len(images)} images, expected one for all frames; see truth-frames", line=1)
     return dict.fromkeys(images, 0)
 
 
-def _box(entry: Node, image: Node) -> Area:
+def _box(path: Path, entry: Annotation, image: Picture, place: str) -> Area:
     """The box as fractions of its image."""
-    if entry.value.get("iscrowd"):
-        raise InputError(entry.file, "iscrowd is set, expected the box of one object", entry.place)
-    width, height = (_whole(image, side, 1) for side in ("width", "height"))
-    numbers, place = entry.value.get("bbox"), f"{entry.place}.bbox"
-    if not isinstance(numbers, list) or len(numbers) != 4 or not all(map(_is_number, numbers)):
-        Node(entry.file, place, numbers).fail("four numbers [x, y, width, height] in pixels")
-    x, y, wide, high = map(float, numbers)
-    if wide <= 0 or high <= 0:
-        raise InputError(entry.file, f"has no area, {wide:g} x {high:g} pixels", place)
-    if x >= width or y >= height or x + wide <= 0 or y + high <= 0:
-        raise InputError(entry.file, f"lies outside its image of {width} x {height} pixels", place)
-    return (x / width, y / height, wide / width, high / height)
-
-
-def _name(entry: Node) -> str:
-    name = entry.value.get("name")
-    if not isinstance(name, str) or not plain(name):
-        Node(entry.file, f"{entry.place}.name", name).fail("a string")
-    return plain(name)
-
-
-def _known(entry: Node, key: str, known: Mapping[int, object]) -> int:
-    number = _whole(entry, key)
-    if number not in known:
-        raise InputError(entry.file, f"no entry has the id {number}", f"{entry.place}.{key}")
-    return number
-
-
-def _whole(entry: Node, key: str, least: int = 0) -> int:
-    value = entry.value.get(key)
-    if not isinstance(value, int) or isinstance(value, bool) or not least <= value < LARGEST:
-        Node(entry.file, f"{entry.place}.{key}", value).fail(f"a whole number, {least} or more")
-    return value
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and -LARGEST < value < LARGEST
+    (x, y, wide, high), problem = entry.bbox, ""
+    if entry.iscrowd:
+        problem = "iscrowd is set, expected the box of one object"
+    elif wide <= 0 or high <= 0:
+        problem = f"has no area, {wide:g} x {high:g} pixels"
+    elif x >= image.width or y >= image.height or x + wide <= 0 or y + high <= 0:
+        problem = f"lies outside its image of {image.width} x {image.height} pixels"
+    if problem:
+        raise InputError(path, problem, f"{place}.bbox")
+    return (x / image.width, y / image.height, wide / image.width, high / image.height)

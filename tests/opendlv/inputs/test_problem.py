@@ -30,12 +30,6 @@ def test_places_in_json(where: str, position: tuple[int, int]) -> None:
     assert json_position(TEXT, where) == position
 
 
-def test_places_of_keys() -> None:
-    assert json_position(TEXT, "$.a.b", is_of_key=True) == (1, 16)
-    assert json_position(TEXT, "d", is_of_key=True) == (3, 2)
-    assert json_position(TEXT, "d[1]", is_of_key=True) == (3, 7)
-
-
 def test_a_problem_has_its_place_in_the_file(tmp_path: Path) -> None:
     file = tmp_path / "map.json"
     file.write_text(TEXT)

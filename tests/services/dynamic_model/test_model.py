@@ -1,8 +1,8 @@
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from dodo_dsl.opendlv.assets.car import KIWI
 from services.dynamic_model.model import PEDAL, STEERING, BodyMotion, KiwiDrive, Vehicle

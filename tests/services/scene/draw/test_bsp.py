@@ -16,7 +16,7 @@ def boxes(seed: int) -> list[Face]:
     faces = []
     for _ in range(random.integers(1, 6)):
         x, y, z = random.uniform(-3, 3, 3)
-        instance = Instance((float(x), float(y), float(z)), float(random.uniform(-3, 3)))
+        instance = Instance(float(x), float(y), float(z), float(random.uniform(-3, 3)))
         faces += box_faces(tuple(random.uniform(0.3, 4, 3)), instance, WHITE)
     return faces
 
@@ -62,7 +62,7 @@ def test_a_place_is_drawn_after_what_lies_behind_it_and_before_what_hides_it(sce
 
 
 def test_a_box_is_centred_and_turned_as_opendlv_does():
-    faces = box_faces((4.0, 2.0, 1.0), Instance((10.0, 0.0, 0.5), 0.5), WHITE)
+    faces = box_faces((4.0, 2.0, 1.0), Instance(10.0, 0.0, 0.5, 0.5), WHITE)
     corners = np.concatenate([face.points for face in faces])
     assert (corners[:, 2].min(), corners[:, 2].max()) == pytest.approx((0.0, 1.0))
     turn = np.pi - 0.5
