@@ -84,7 +84,7 @@ def file_problems(context: RuleContext, service: ResolvedService, argument: Argu
     name, path = argument.parameter.format, argument.value.path if argument.value else None
     if not name or path is None:
         return ()
-    given = tuple((key, service.texts.get(key, "")) for key in formats.SETTINGS.get(name, ()))
+    given = tuple((key, service.texts.get(key, "")) for key in formats.FORMATS[name].settings)
     return problems(name, path, given, context.deployment.messages)
 
 
@@ -95,7 +95,7 @@ def problems(
     """The problems of a file of a format, for parameters of the service and files with messages."""
     ids: Mapping[str, int] = known_ids(own)
     return tuple(
-        _diagnostic(error, formats.HELP.get(name, "")) for error in formats.problems(name, path, dict(given), ids)
+        _diagnostic(error, formats.FORMATS[name].help) for error in formats.problems(name, path, dict(given), ids)
     )
 
 

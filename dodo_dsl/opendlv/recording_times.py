@@ -66,11 +66,9 @@ def fault(recording: Recording, rows: Numbers, in_order: bool = True) -> str:
     """
     rows = rows[~np.isin(recording.index["data_type"][rows], list(TOOLS))]
     times = recording.index["time"][rows]
-    if len(missing := rows[times == 0]):
-        return f"{_some(recording, missing, len(rows))} no time at all"
-    if len(apart := rows[~together(times)]):
-        others = rows[together(times)]
-        return f"{_some(recording, apart, len(rows))} times that lie {_distance(recording, apart, others)} the others'"
+    for wrong, what in ((times == 0, "has no time at all"), (~together(times), "has a time days from the others'")):
+        if wrong.any():
+            return f"{place(recording, int(rows[wrong][0]))} {what}, one of {wrong.sum():,} such messages"
     parts = streams(recording.index, rows) if in_order else ()
     return next((text for part in parts if (text := _disorder(recording, part))), "")
 
@@ -84,15 +82,11 @@ def repeated(recording: Recording, rows: Numbers) -> str:
     members = np.zeros(len(rows), np.bool_)
     members[order[1:][alike]] = members[order[:-1][alike]] = True
     seen: dict[bytes, int] = {}
-    for batch_row, frame in zip(rows[members].tolist(), _frames(recording, rows[members]), strict=True):
-        if (first := seen.setdefault(frame, batch_row)) != batch_row:
-            return f"{place(recording, batch_row)} is there twice, as message {first + 1:,} already"
+    frames = (frame for batch in recording.batches(rows[members]) for frame in batch.frames())
+    for row, frame in zip(rows[members].tolist(), frames, strict=True):
+        if (first := seen.setdefault(frame, row)) != row:
+            return f"{place(recording, row)} is there twice, as message {first + 1:,} already"
     return ""
-
-
-def _frames(recording: Recording, rows: Numbers) -> Iterator[bytes]:
-    for batch in recording.batches(rows):
-        yield from batch.frames()
 
 
 def _disorder(recording: Recording, rows: Numbers) -> str:
@@ -102,10 +96,8 @@ def _disorder(recording: Recording, rows: Numbers) -> str:
     back = np.flatnonzero(np.diff(times) < -least)
     if not len(back):
         return repeated(recording, rows)
-    row, steps = int(rows[back[0] + 1]), len(back)
     size = span(float(times[back[0]] - times[back[0] + 1]) / 1e6)
-    more = f", and so do {steps - 1:,} others" if steps > 1 else ""
-    return f"{place(recording, row)} goes back in time, by {size}{more}"
+    return f"{place(recording, int(rows[back[0] + 1]))} goes back in time, by {size}"
 
 
 def streams(index: NDArray[np.void], rows: Numbers) -> Iterator[Numbers]:
@@ -128,15 +120,3 @@ def place(recording: Recording, row: int) -> str:
     id_ = int(entry["data_type"])
     name = known.name(id_) if id_ in known.ids() else str(id_)
     return f"message {row + 1:,} ({name}/{entry['sender_stamp']}, at byte {entry['offset']:,})"
-
-
-def _some(recording: Recording, rows: Numbers, of: int) -> str:
-    has = "has" if len(rows) == 1 else "have"
-    first = f"the first is {place(recording, int(rows[0]))}"
-    return f"{len(rows):,} of {of:,} messages, {first}, {has}"
-
-
-def _distance(recording: Recording, rows: Numbers, others: Numbers) -> str:
-    first, near = int(recording.index["time"][rows[0]]), recording.index["time"][others]
-    low, high = int(near.min()), int(near.max())
-    return f"{span((low - first) / 1e6)} before" if first < low else f"{span((first - high) / 1e6)} after"

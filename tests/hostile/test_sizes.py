@@ -82,8 +82,8 @@ PICTURES = (load_picture, load_with_alpha, frame_of)
 REFUSED: list[tuple[str, bytes, Callable[[Path], object], str]] = [
     *((name, data, read, TOO_LARGE) for name, data in BOMBS.items() for read in PICTURES),
     *(("a.png", data, load_picture, "not a readable image, expected PNG or JPEG") for data in UNREADABLE),
-    ("a.obj", FACES, load_obj, f"{MAX_TRIANGLES + 1} triangles"),
-    ("a.obj", b" \tv 0 0 0\n" * (MAX_VERTICES + 1), load_obj, f"{MAX_VERTICES + 1} vertices"),
+    ("a.obj", FACES, load_obj, f"more than {MAX_TRIANGLES} faces"),
+    ("a.obj", b" \tv 0 0 0\n" * (MAX_VERTICES + 1), load_obj, f"more than {MAX_VERTICES} vertices"),
     ("a.obj", b"# " + b"x" * MAX_BYTES, load_obj, f"{MAX_BYTES + 2} bytes, expected at most {MAX_BYTES}"),
     ("map.json", json.dumps({"overlay": [OVERLAY]}).encode(), map_of, f"{MAX_OVERLAYS + 1} instances of overlays"),
     ("a.odvd", f"{DOUBLED}\nmessage a.M30 [id = 4999] {{ uint8 x [id = 1]; }}".encode(), MessageSet.load,

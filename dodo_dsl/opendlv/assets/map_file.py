@@ -267,14 +267,18 @@ class _Framed(Struct):
     frames: Stamps = ()
 
 
+class _Moving(Struct):
+    model: list[_Framed] = []
+
+
 def read_frames(path: Path) -> tuple[int, ...]:
     """The sender stamps at which a map has models, in order; none for a file that another check refuses."""
     file = find_map(path)
     try:
-        models = list(entries(file, document_of(file), "model", _Framed))
+        models = converted(file, document_of(file), _Moving).model
     except InputError:
         return ()
-    found = {stamp for model in models if isinstance(model, _Framed) for stamp in model.frames}
+    found = {stamp for model in models for stamp in model.frames}
     return tuple(sorted(found)) if len(found) <= MAX_FRAMES else ()
 
 

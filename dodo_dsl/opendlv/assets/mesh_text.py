@@ -17,16 +17,14 @@ MAX_BYTES = 16 << 20
 MAX_TRIANGLES = 50_000
 MAX_VERTICES = 4 * MAX_TRIANGLES
 FARTHEST = 1e5
-_FACE, _VERTEX = (re.compile(rb"^[ \t]*%b[ \t]" % letter, re.MULTILINE) for letter in (b"f", b"v"))
 _BOM, _CONTINUED = b"\xef\xbb\xbf", b"\\"
-_THREE = 3
 
-Vertex = tuple[float, ...]
+Vertex = tuple[float, float, float]
 Triangle = tuple[int, int, int]
 
 
 class _Wrong(Exception):
-    """Carries the line from 1, 0 for the whole file, what is wrong, and a hint."""
+    """Carries the line from 1, 0 for the whole file, and what is wrong."""
 
 
 class Face(NamedTuple):
@@ -59,7 +57,7 @@ class Mesh:
                 found += [((a, b, c), number), ((c, more[0], a), number)]
             else:
                 found += [((a, second, third), number) for second, third in itertools.pairwise(face.corners[1:])]
-        if all(len(face.corners) == _THREE + 1 for face in self.faces):
+        if all(len(face.corners) == 4 for face in self.faces):
             found = [*found[::2], *found[1::2]]
         return [triangle for triangle, _ in found], [number for _, number in found]
 
@@ -69,51 +67,31 @@ def read(path: Path) -> Mesh:
     try:
         return _mesh(read_bytes(path))
     except _Wrong as wrong:
-        line, what, hint = wrong.args
-        raise InputError(path, what, line=line, hint=hint) from None
+        line, what = wrong.args
+        raise InputError(path, what, line=line) from None
 
 
 @functools.lru_cache(maxsize=4)
 def _mesh(data: bytes) -> Mesh:
     """Raises _Wrong."""
     if len(data) > MAX_BYTES:
-        raise _Wrong(0, f"the OBJ file has {len(data)} bytes, expected at most {MAX_BYTES}", "")
-    for pattern, what, most in ((_FACE, "triangles", MAX_TRIANGLES), (_VERTEX, "vertices", MAX_VERTICES)):
-        count = sum(1 for _ in pattern.finditer(data))
-        if count > most:
-            raise _Wrong(0, f"{count} {what}, expected at most {most}", "save a simpler mesh")
+        raise _Wrong(0, f"the OBJ file has {len(data)} bytes, expected at most {MAX_BYTES}")
     mesh = _parsed(data)
-    triangles, _ = mesh.triangles()
-    if not triangles:
-        hint = "save the mesh as Wavefront OBJ with its faces, lines that begin with f"
-        raise _Wrong(0, "the OBJ file has no faces", hint)
-    if len(triangles) > MAX_TRIANGLES:
-        raise _Wrong(0, f"{len(triangles)} triangles, expected at most {MAX_TRIANGLES}", "save a simpler mesh")
-    if not any(_has_area([mesh.vertices[corner] for corner in each]) for each in triangles):
-        raise _Wrong(0, "no face of the OBJ file has an area", "save the mesh again: all its triangles are lines")
+    if not mesh.faces:
+        raise _Wrong(0, "the OBJ file has no faces, lines that begin with f")
+    if (count := sum(len(face.corners) - 2 for face in mesh.faces)) > MAX_TRIANGLES:
+        raise _Wrong(0, f"{count} triangles, expected at most {MAX_TRIANGLES}: save a simpler mesh")
     return mesh
 
 
 def outline(path: Path) -> list[tuple[float, float]]:
-    """The convex outline of an OBJ file's faces from above, counter-clockwise in m; raises InputError."""
+    """The convex outline of an OBJ file's faces from above, in m; raises InputError."""
+    import shapely
+
     mesh = read(path)
-    used = {corner for face in mesh.faces for corner in face.corners}
-    points = sorted({(x, y) for x, y, *_ in (mesh.vertices[corner] for corner in used)})
-    return [*_lower_half(points), *_lower_half(points[::-1])]
-
-
-def _lower_half(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """From the first point to the last but one (Andrew 1979)."""
-    kept: list[tuple[float, float]] = []
-    for x, y in points:
-        while len(kept) > 1 and _turn(kept[-2], kept[-1], (x, y)) <= 0.0:
-            kept.pop()
-        kept.append((x, y))
-    return kept[:-1]
-
-
-def _turn(a: Vertex, b: Vertex, c: Vertex) -> float:
-    return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+    points = {mesh.vertices[corner][:2] for face in mesh.faces for corner in face.corners}
+    ring = shapely.get_coordinates(shapely.convex_hull(shapely.MultiPoint(sorted(points))))
+    return list(map(tuple, ring[: len(ring) - (len(ring) > 2)].tolist()))
 
 
 def _lines(data: bytes) -> Iterator[tuple[int, list[bytes]]]:
@@ -138,13 +116,16 @@ def _parsed(data: bytes) -> Mesh:
         if words[0] == b"v":
             mesh.vertices.append(_vertex(number, words))
         elif words[0] == b"vt":
-            mesh.spots.append(words[1:_THREE])
+            mesh.spots.append(words[1:3])
         elif words[0] == b"f":
             faces.append((number, words, material, len(mesh.vertices), len(mesh.spots)))
         elif words[0] == b"usemtl":
             material = b" ".join(words[1:])
         elif words[0] == b"mtllib":
             mesh.libraries.append((number, b" ".join(words[1:])))
+        for count, most, what in ((len(faces), MAX_TRIANGLES, "faces"), (len(mesh.vertices), MAX_VERTICES, "vertices")):
+            if count > most:
+                raise _Wrong(number, f"more than {most} {what}: save a simpler mesh")
     for number, words, material, *before in faces:
         mesh.faces.append(_face(number, words, material, mesh, before))
     return mesh
@@ -152,20 +133,12 @@ def _parsed(data: bytes) -> Mesh:
 
 def _vertex(number: int, words: Sequence[bytes]) -> Vertex:
     try:
-        place = tuple(float(word) for word in words[1:4])
+        x, y, z = (float(word) for word in words[1:4])
     except ValueError:
-        place = ()
-    if len(place) < _THREE:
-        commas = any(b"," in word for word in words)
-        hint = (
-            f"decimals have a point: write '{_text(words).replace(',', '.')}'"
-            if commas
-            else "for example 'v 0.1 0.2 0.3'"
-        )
-        raise _Wrong(number, f"'{_text(words)}' is not a vertex, expected v and three numbers in m", hint)
-    if not all(abs(part) <= FARTHEST for part in place):
-        raise _Wrong(number, "the OBJ file has vertices that are not finite numbers below 100 km", "save it in m")
-    return place
+        x = y = z = math.nan
+    if not all(abs(part) <= FARTHEST for part in (x, y, z)):
+        raise _Wrong(number, f"'{_text(words)}' is no vertex, expected as 'v 0.1 0.2 0.3' numbers in m, below 100 km")
+    return x, y, z
 
 
 def _face(number: int, words: Sequence[bytes], material: bytes, mesh: Mesh, before: Sequence[int]) -> Face:
@@ -176,31 +149,17 @@ def _face(number: int, words: Sequence[bytes], material: bytes, mesh: Mesh, befo
         corners = [int(part[0]) for part in parts]
         spots = [int(part[1]) for part in parts if len(part) > 1 and part[1]]
     except ValueError:
-        corners = []
-    if len(corners) < _THREE:
-        hint = "for example 'f 1 2 3', the numbers of its vertices from 1"
-        raise _Wrong(number, f"'{_text(words)}' is not a face, expected f and three or more vertices", hint)
-    count = len(mesh.vertices)
+        corners, spots = [], []
     numbers = zip((corners, spots), before, strict=True)
-    counted, spots = ([n + so_far + 1 if n < 0 else n for n in each] for each, so_far in numbers)
-    outside = next((n for n, each in zip(corners, counted, strict=True) if not 0 < each <= count), None)
-    if outside is not None:
-        raise _Wrong(number, f"the face has vertex {outside}, expected 1 to {count}", "save the whole mesh again")
-    return Face(number, [each - 1 for each in counted], [each - 1 for each in spots if each > 0], material)
+    corners, spots = ([n + so_far if n < 0 else n - 1 for n in each] for each, so_far in numbers)
+    if len(corners) < 3 or not all(0 <= each < len(mesh.vertices) for each in corners):
+        what = f"'{_text(words)}' is no face, expected as 'f 1 2 3' the numbers of three or more of its "
+        raise _Wrong(number, f"{what}{len(mesh.vertices)} vertices")
+    return Face(number, corners, [each for each in spots if each >= 0], material)
 
 
 def _text(words: Sequence[bytes]) -> str:
     return b" ".join(words).decode("ascii", "replace")[:40]
-
-
-def _has_area(corners: Sequence[Vertex]) -> bool:
-    """Whether a triangle is more than a line."""
-    a, b, c = corners
-    (ux, uy, uz), (vx, vy, vz) = ([q - p for p, q in zip(a, other, strict=True)] for other in (b, c))
-    doubled = ((uy * vz - uz * vy) ** 2 + (uz * vx - ux * vz) ** 2 + (ux * vy - uy * vx) ** 2) ** 0.5
-    pairs = ((a, b), (b, c), (c, a))
-    longest = max(sum((p - q) ** 2 for p, q in zip(*pair, strict=True)) for pair in pairs)
-    return bool(doubled > 1e-6 * longest)
 
 
 Paint = tuple[float, float, float] | Path
@@ -219,11 +178,11 @@ def paints(path: Path, mesh: Mesh, folder: Path) -> list[tuple[Paint, Spots]]:
     for line, names in mesh.libraries:
         for name in [names] if (path.parent / _name(names)).is_file() else names.split():
             known.update(_materials(_inside(folder, path, line, name), folder))
-    hint = "the file that mtllib names lacks it" if mesh.libraries else "name the file of its materials with mtllib"
+    hint = "the file of materials that mtllib names lacks it"
     for face in mesh.faces:
         if known.get(face.material) is None:
-            what = f"material '{_text([face.material])}' has no colour" if face.material else "the face has no material"
-            raise InputError(path, f"{what}, and the map gives the model none", line=face.line, hint=hint)
+            what = f"material '{_text([face.material])}' has no colour, and the map gives the model none"
+            raise InputError(path, what, line=face.line, hint=hint)
     painted = ((face, known[face.material]) for face in mesh.faces)
     return [(p, _spots(path, mesh, face) if isinstance(p, Path) else []) for face, p in painted if p is not None]
 
@@ -270,10 +229,9 @@ def _materials(file: Path, folder: Path) -> Iterator[tuple[bytes, Paint | None]]
             yield name, _inside(folder, file, line, b" ".join(texture))
         elif key == b"kd" and not is_texture:
             try:
-                red, green, blue = (
-                    min(max(0.0, float(word)), 1.0) for word in words[1:4] * (3 if len(words) == 2 else 1)
-                )
+                grey = 3 if len(words) == 2 else 1
+                red, green, blue = (min(max(0.0, float(word)), 1.0) for word in words[1:4] * grey)
             except ValueError:
                 what = f"'{_text(words)}' is not a colour, expected Kd and three numbers from 0 to 1"
-                raise InputError(file, what, line=line, hint="for example 'Kd 1 0.85 0'") from None
+                raise InputError(file, what, line=line) from None
             yield name, (red, green, blue)

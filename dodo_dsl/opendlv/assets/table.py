@@ -1,22 +1,19 @@
 """CSV tables: names in a header, and rows of numbers below it. All that is read from tables is read here."""
 
 import csv
-import difflib
-from collections.abc import Iterator, Sequence
-from decimal import Decimal, InvalidOperation
+import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.envelope import MICROSECONDS
-from dodo_dsl.opendlv.numbers import exact
+from dodo_dsl.opendlv.numbers import number
 
 TIME, VALUE = "time", "value"
 _LATEST = 2**52
 """Microseconds; beyond it they are not exact as numbers of 64 bits."""
-_LEAST = 2
-_HEADER = "for example 'time,x,y'"
 
 
 class Row(NamedTuple):
@@ -25,15 +22,6 @@ class Row(NamedTuple):
     line: int
     text: str
     cells: list[str]
-
-    def column(self, number: int) -> int:
-        """Where a cell begins in the text, from 1; the start of a line with quoted cells."""
-        before = self.text.split(",")
-        if len(before) != len(self.cells):
-            return 1
-        return (
-            sum(len(each) + 1 for each in before[:number]) + self.text.split(",")[number].find(self.cells[number]) + 1
-        )
 
 
 class Table:
@@ -47,18 +35,15 @@ class Table:
         self.path = path
         rows = list(self._read())
         if not rows:
-            raise InputError(path, "the table is empty, expected a header and rows", hint=_HEADER)
+            raise InputError(path, "the table is empty, expected a header such as 'time,x,y', and rows")
         self._header, self.rows = rows[0], rows[1:]
         self.names = self._header.cells
         if len(self.names) == 1 and ";" in self._header.text:
-            what = "semicolons between the columns, expected commas, and decimals with a point"
-            column = self._header.text.index(";") + 1
-            raise InputError(path, what, line=self._header.line, column=column, hint="save the table anew like that")
+            self.fail(self._header, 0, "semicolons between the columns, expected commas, and decimals with a point")
         if all(_number(cell) is not None for cell in self.names):
-            self.fail(self._header, 0, "the table has no header", _HEADER)
-        if len(self.rows) < _LEAST:
-            what = f"expected at least {_LEAST} rows below the header, found {len(self.rows)}"
-            self.fail(rows[-1], 0, what, "save the whole table")
+            self.fail(self._header, 0, "the table has no header, expected one such as 'time,x,y'")
+        if len(self.rows) < 2:
+            self.fail(rows[-1], 0, f"expected at least 2 rows below the header, found {len(self.rows)}")
         for row in self.rows:
             if len(row.cells) != len(self.names):
                 what = f"{len(row.cells)} values, expected {len(self.names)}: {', '.join(self.names)}"
@@ -66,28 +51,26 @@ class Table:
         self.times = self._increasing() if TIME in self.names else []
         """Microseconds of each row."""
 
-    def numbers(self, name: str) -> list[Decimal]:
+    def numbers(self, name: str) -> list[float]:
         """The finite numbers in a column; raises InputError."""
-        at = self.names.index(name)
+        at, found = self.names.index(name), list[float]()
         if self.names.count(name) > 1:
             self.fail(self._header, at, f"the column '{name}' appears twice")
-        return [self._number(row, at) for row in self.rows]
-
-    def misspelt(self, known: Sequence[str]) -> Iterator[InputError]:
-        """Columns with none of these names, but almost one of them."""
-        for at, name in enumerate(self.names):
-            if name not in known and (close := difflib.get_close_matches(name.lower(), known, 1, cutoff=0.75)):
-                what = f"unknown column '{name}', did you mean '{close[0]}'?"
-                column = self._header.column(at)
-                yield InputError(self.path, what, line=self._header.line, column=column, is_slip=True)
+        for row in self.rows:
+            value = _number(row.cells[at])
+            if value is None or not math.isfinite(value):
+                self.fail(row, at, f"{name}: '{row.cells[at]}' is not a finite number")
+            found.append(value)
+        return found
 
     def lacks(self, expected: str) -> NoReturn:
         """Raises InputError for a header without what was expected."""
         self.fail(self._header, 0, f"expected a header with {expected}, found {', '.join(self.names)}")
 
     def fail(self, row: Row, column: int, what: str, hint: str = "") -> NoReturn:
-        """Raises InputError for a cell."""
-        raise InputError(self.path, what, line=row.line, column=row.column(column), hint=hint)
+        """Raises InputError for a cell, which begins behind so many commas."""
+        before = row.text.split(",")[:column]
+        raise InputError(self.path, what, line=row.line, column=sum(len(each) + 1 for each in before) + 1, hint=hint)
 
     def _read(self) -> Iterator[Row]:
         try:
@@ -103,12 +86,6 @@ class Table:
                 except csv.Error as error:
                     raise InputError(self.path, str(error), line=line, column=1) from None
 
-    def _number(self, row: Row, at: int) -> Decimal:
-        number = _number(row.cells[at])
-        if number is None or not number.is_finite() or abs(float(number)) == float("inf"):
-            self.fail(row, at, f"{self.names[at]}: '{row.cells[at]}' is not a finite number")
-        return number
-
     def _increasing(self) -> list[int]:
         at, found = self.names.index(TIME), list[int]()
         for row, seconds in zip(self.rows, self.numbers(TIME), strict=True):
@@ -122,10 +99,10 @@ class Table:
         return found
 
 
-def _number(text: str) -> Decimal | None:
+def _number(text: str) -> float | None:
     try:
-        return exact(text)
-    except (InvalidOperation, ValueError):
+        return number(text)
+    except ValueError:
         return None
 
 
@@ -135,11 +112,4 @@ def read_target(path: Path, field: str) -> list[tuple[int, float]]:
     name = next((name for name in (field, VALUE) if name in table.names and name != TIME), None)
     if TIME not in table.names or name is None:
         table.lacks(f"the columns {TIME} and {field} (or {VALUE})")
-    return list(zip(table.times, map(float, table.numbers(name)), strict=True))
-
-
-def misspelt(path: Path, field: str) -> Iterator[InputError]:
-    """Columns of a sound table that are almost spelt like ``field``, where the values are those of ``value``."""
-    table = Table(path)
-    if field not in table.names:
-        yield from (each for each in table.misspelt([field, TIME, VALUE]) if f"'{field}'" in each.what)
+    return list(zip(table.times, table.numbers(name), strict=True))

@@ -57,15 +57,6 @@ class TrajectoryPose:
         return c * vx + s * vy, c * vy - s * vx, vz
 
 
-@dataclass(frozen=True)
-class _Knot:
-    time: float
-    x: float
-    y: float
-    z: float
-    yaw: float
-
-
 class Trajectory:
     """Poses over time, from two way points or more.
 
@@ -77,22 +68,23 @@ class Trajectory:
         """``speed`` (m/s) makes the times where the points have none; raises TrajectoryError."""
         if len(points) < 2:
             raise TrajectoryError("expected two way points or more", points[0] if points else None)
-        yaws = [p.yaw for p in points]
-        turned = [y for y in yaws if y is not None] if None not in yaws else headings(points)
-        timed = _timed(points) if points[0].time is not None else _at_speed(points, speed)
-        self._knots = [_Knot(t, p.x, p.y, p.z, yaw) for t, p, yaw in zip(timed, points, turned, strict=True)]
-        self._times = timed
-        self.duration = math.inf if endless else timed[-1]
+        yaws = [p.yaw for p in points if p.yaw is not None]
+        turned = yaws if len(yaws) == len(points) else headings(points)
+        self._times = _timed(points) if points[0].time is not None else _at_speed(points, speed)
+        self._points = [(p.x, p.y, p.z, yaw) for p, yaw in zip(points, turned, strict=True)]
+        self.duration = math.inf if endless else self._times[-1]
 
     def at(self, time: float) -> TrajectoryPose:
         """The pose ``time`` seconds after the start; the velocity at a way point is the one from there on."""
-        index = min(bisect.bisect_right(self._times, time), len(self._knots) - 1)
-        a, b = self._knots[max(index - 1, 0)], self._knots[max(index, 1)]
-        if time < a.time:
-            return _standing(a)
-        if time >= b.time and time >= self.duration:
-            return _standing(b)
-        return _between(a, b, time)
+        index = max(min(bisect.bisect_right(self._times, time), len(self._times) - 1), 1)
+        (begin, end), (a, b) = self._times[index - 1 : index + 1], self._points[index - 1 : index + 1]
+        if time < begin or (time >= end and time >= self.duration):
+            x, y, z, yaw = a if time < begin else b
+            return TrajectoryPose(x, y, z, wrapped(yaw))
+        took, turn, share = end - begin, wrapped(b[3] - a[3]), (time - begin) / (end - begin)
+        x, y, z = (p + share * (q - p) for p, q in zip(a[:3], b[:3], strict=True))
+        velocity = ((b[0] - a[0]) / took, (b[1] - a[1]) / took, (b[2] - a[2]) / took)
+        return TrajectoryPose(x, y, z, wrapped(a[3] + share * turn), velocity, turn / took)
 
 
 def wrapped(angle: float) -> float:
@@ -136,18 +128,6 @@ def _at_speed(points: Sequence[PathPoint], speed: float) -> list[float]:
     return times
 
 
-def _between(a: _Knot, b: _Knot, time: float) -> TrajectoryPose:
-    took, turn = b.time - a.time, wrapped(b.yaw - a.yaw)
-    share = (time - a.time) / took
-    x, y, z = (p + share * (q - p) for p, q in ((a.x, b.x), (a.y, b.y), (a.z, b.z)))
-    velocity = ((b.x - a.x) / took, (b.y - a.y) / took, (b.z - a.z) / took)
-    return TrajectoryPose(x, y, z, wrapped(a.yaw + share * turn), velocity, turn / took)
-
-
-def _standing(knot: _Knot) -> TrajectoryPose:
-    return TrajectoryPose(knot.x, knot.y, knot.z, wrapped(knot.yaw))
-
-
 def straight(x: float, y: float, z: float, yaw: float, length: float | None, speed: float) -> Trajectory:
     """A straight trajectory from a position along ``yaw`` (rad), without end if it has no ``length`` (m)."""
     begin = PathPoint("the start", x, y, z, yaw)
@@ -165,11 +145,9 @@ def read_table(path: Path, height: float) -> list[PathPoint]:
     Columns x, y and z in m, yaw in rad, time in s; other columns are ignored. Raises InputError.
     """
     table = Table(path)
-    for error in table.misspelt(POSSIBLE):
-        raise error
     if any(name not in table.names for name in NEEDED):
         table.lacks("the columns x and y")
-    columns = {name: [float(each) for each in table.numbers(name)] for name in POSSIBLE if name in table.names}
+    columns = {name: table.numbers(name) for name in POSSIBLE if name in table.names}
     values = [dict(zip(columns, each, strict=True)) for each in zip(*columns.values(), strict=True)]
     return [
         PathPoint(f"{path}:{row.line}", **{"z": height, **each}, line=row.line)

@@ -203,6 +203,4 @@ def test_a_recording_with_times_that_cannot_be_right_makes_no_test(empty: Path, 
     (empty / "drive.rec").write_bytes(b"".join(map(encode_frame, [wrong, *others])))
     code, _, err = dodo("new", "mine", "--rec", "drive.rec")
     assert code == 2
-    assert err.startswith(
-        f"dodo new: 'drive.rec' cannot be played: 1 of 20 messages, the first is message 1 ({STEERING}/0"
-    )
+    assert err.startswith(f"dodo new: 'drive.rec' cannot be played: message 1 ({STEERING}/0")

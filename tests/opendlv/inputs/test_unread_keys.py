@@ -68,14 +68,6 @@ def test_a_key_of_many_objects_is_told_once(told: Callable[[str, Any], list[Inpu
     assert found.hint == "did you mean 'lines'?"
 
 
-def test_a_column_that_is_almost_the_field_is_told(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("time,value,groundSteerng\n0,1,2\n1,1,2\n")
-    given = dict.fromkeys(formats.SETTINGS["target"], "") | {"field": "groundSteering"}
-    (found,) = formats.problems("target", tmp_path / "a.csv", given, {})
-    assert (found.is_slip, found.position()) == (True, (1, 12))
-    assert found.what == "unknown column 'groundSteerng', did you mean 'groundSteering'?"
-
-
 def test_bodies_that_a_map_does_not_have_are_told(tmp_path: Path) -> None:
     (tmp_path / "map.json").write_text(json.dumps({"model": [{"frames": [0]}], "obstacles": []}))
     given = {"bodies": "true", "frame-id": "0"}

@@ -25,8 +25,14 @@ def at(row: int, **changed: int) -> list[Envelope]:
         (at(7, sample_time=0), ""),
         ([*DRIVE, Envelope(TOOL, b"", 0, 0, 0, 0)], ""),
         ([Envelope(2900, b"", 0, 0, 0, 0), *DRIVE], ""),
-        (at(7, sent=0, received=0, sample_time=0), "1 of 20 messages, the first is message 8 (opendlv.proxy.Ground"),
-        (at(7, sample_time=T0 - 10**15), "1 of 20 messages, the first is message 8 (opendlv.proxy.GroundSteeringReq"),
+        (
+            at(7, sent=0, received=0, sample_time=0),
+            "message 8 (opendlv.proxy.GroundSteeringRequest/1, at byte 301) has no time at all, one of 1",
+        ),
+        (
+            at(7, sample_time=T0 - 10**15),
+            "message 8 (opendlv.proxy.GroundSteeringRequest/1, at byte 301) has a time days from",
+        ),
         (at(7, sample_time=T0 + 100 * S), "message 10 (opendlv.proxy.GroundSteeringRequest/1, at byte 387) goes back"),
         (
             [*DRIVE[:9], *DRIVE[8:]],

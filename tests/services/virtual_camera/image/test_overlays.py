@@ -44,7 +44,7 @@ def test_an_overlay_may_leave_the_picture(write_map, place):
 def test_overlays_that_make_no_sense_are_told(write_map):
     for entry, message in (
         (overlay(size=(1.5, 1)), r"overlay\[0\].dimension\[0\]: expected a number <= 1.0"),
-        (overlay(place=(1,)), r"overlay\[0\].instances\[0\]: expected a list of length"),
+        ({**overlay(), "instances": [[1]]}, r"overlay\[0\].instances\[0\]: expected a list of length"),
         (overlay("none.png"), r"overlay\[0\].textureFile: expected a regular file"),
     ):
         with pytest.raises(InputError, match=message):
