@@ -19,7 +19,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Self
 
-from dodo_dsl.opendlv.sysv_memory import MAX_NAME, Result, SharedMemoryError
+from dodo_dsl.opendlv.sysv_memory import MAX_NAME, MODE, SharedMemoryError, Time, remove_own
 
 CLOCK_MONOTONIC = 1
 _MUTEX_BYTES = 48 if platform.machine() == "aarch64" else 40
@@ -27,33 +27,24 @@ _CONDITION_BYTES = 48
 MUTEX_AT = 8
 CONDITION_AT = MUTEX_AT + _MUTEX_BYTES
 HEADER_BYTES = CONDITION_AT + _CONDITION_BYTES
-_SHARED, _ROBUST = 1, 1
 _PATIENCE = 1.0
+_SLICE = 0.1
+"""Seconds."""
 
 _libc = ctypes.CDLL(None)
 _NEW_LAYOUT = tuple(map(int, re.findall(r"\d+", platform.libc_ver()[1])[:2])) >= (2, 41)
 _REFERENCES_AT = 16  # in the condition: two counts of woken waiters
 _WAITERS_AT = 28 if _NEW_LAYOUT else 36
 
-
-class _Time(ctypes.Structure):
-    _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
-
-
 FOLDER = Path("/dev/shm")  # where the C library's shm_open keeps its objects
-_SLICE = 0.1  # seconds
-MODE = 0o666
-"""Whatever the umask: the application, another user, takes its lock."""
 _FLAGS = os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 def path_of(name: str) -> Path:
     """The object's file: ``foo`` and ``/foo`` are the same; raises SharedMemoryError."""
     short = name.removeprefix("/")
-    if not short or "/" in short or "\0" in short or short in (".", ".."):
-        raise SharedMemoryError(f"'{name}' is not a name of POSIX shared memory")
-    if len(short) >= MAX_NAME:
-        raise SharedMemoryError(f"the name of shared memory '{name[:40]}...' is longer than {MAX_NAME} characters")
+    if not short or "/" in short or "\0" in short or short in (".", "..") or len(short) >= MAX_NAME:
+        raise SharedMemoryError(f"'{name[:40]}' is not a name of POSIX shared memory")
     return FOLDER / short
 
 
@@ -72,23 +63,21 @@ class PosixSegment:
     @classmethod
     def create(cls, path: Path, size: int) -> Self:
         """Make it anew; what a dead creator left is removed. Raises SharedMemoryError."""
+        token = -1
         try:
             _remove_orphan(path)
             token = os.open(path, _FLAGS | os.O_CREAT | os.O_EXCL, MODE)
-        except SharedMemoryError:
-            raise
-        except OSError as error:
-            raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: {path}: {error.strerror}") from None
-        try:
             os.fchmod(token, MODE)
             fcntl.flock(token, fcntl.LOCK_SH | fcntl.LOCK_NB)  # shows other creators that we live
             os.posix_fallocate(token, 0, HEADER_BYTES + size)  # a full memory is an error now, not a SIGBUS later
             made = cls(path, token, mmap.mmap(token, HEADER_BYTES + size))
             made._set_up(size)
         except OSError as error:
-            path.unlink(missing_ok=True)
-            os.close(token)
-            raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: {error.strerror}") from None
+            if token >= 0:
+                path.unlink(missing_ok=True)
+                os.close(token)
+            what = f"{path}: {error.strerror or error}"
+            raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: {what}") from None
         return made
 
     @classmethod
@@ -109,12 +98,12 @@ class PosixSegment:
     def _set_up(self, size: int) -> None:
         attributes = ctypes.create_string_buffer(64)
         _call("pthread_mutexattr_init", attributes)
-        _call("pthread_mutexattr_setpshared", attributes, _SHARED)
-        _call("pthread_mutexattr_setrobust", attributes, _ROBUST)
+        _call("pthread_mutexattr_setpshared", attributes, 1)
+        _call("pthread_mutexattr_setrobust", attributes, 1)
         _call("pthread_mutex_init", self._mutex, attributes)
         _call("pthread_condattr_init", attributes)
         _call("pthread_condattr_setclock", attributes, CLOCK_MONOTONIC)
-        _call("pthread_condattr_setpshared", attributes, _SHARED)
+        _call("pthread_condattr_setpshared", attributes, 1)
         _call("pthread_cond_init", self._condition, attributes)
         self._size.value = size
 
@@ -127,32 +116,31 @@ class PosixSegment:
         """A view of the data, which keeps the memory mapped."""
         return memoryview(self._memory)[HEADER_BYTES : HEADER_BYTES + self.size]
 
-    def lock(self, timeout: float) -> Result:
-        """Take the mutex; TIMEOUT when another holds it for ``timeout`` seconds. Raises OSError if it is broken."""
-        code = _libc.pthread_mutex_clocklock(self._mutex, CLOCK_MONOTONIC, ctypes.byref(_deadline(timeout)))
-        return self._result(code)
+    def lock(self, timeout: float) -> bool:
+        """Take the mutex; False when another holds it for ``timeout`` seconds. Raises OSError if it is broken."""
+        return self._taken(_libc.pthread_mutex_clocklock(self._mutex, CLOCK_MONOTONIC, _deadline(timeout)))
 
     def unlock(self) -> None:
         _call("pthread_mutex_unlock", self._mutex)
 
-    def wait(self, timeout: float | None) -> Result:
+    def wait(self, timeout: float | None) -> bool:
         """Wait for a notification; raises OSError when the creator has removed the memory.
 
         Python looks for signals, and whether the memory is still there, ten times a second.
         """
         end = math.inf if timeout is None else time.monotonic() + timeout
         while True:
-            result = self.lock(min(_SLICE, end - time.monotonic()))
-            if result is Result.DONE:
+            is_woken = self.lock(min(_SLICE, end - time.monotonic()))
+            if is_woken:
                 try:
-                    until = ctypes.byref(_deadline(min(_SLICE, end - time.monotonic())))
-                    result = self._result(_libc.pthread_cond_timedwait(self._condition, self._mutex, until))
+                    until = _deadline(min(_SLICE, end - time.monotonic()))
+                    is_woken = self._taken(_libc.pthread_cond_timedwait(self._condition, self._mutex, until))
                 finally:
                     self.unlock()
             if os.fstat(self.token).st_nlink == 0:
                 raise FileNotFoundError
-            if result is Result.DONE or time.monotonic() >= end:
-                return result
+            if is_woken or time.monotonic() >= end:
+                return is_woken
 
     def wake(self) -> None:
         """Wake all that wait; raises TimeoutError if that would block as a waiter was killed.
@@ -169,43 +157,33 @@ class PosixSegment:
     def readers_waiting(self) -> int:
         return int(self._numbers[_WAITERS_AT // 4]) >> 3  # glibc counts by eights
 
-    def close(self) -> None:
-        """Forget the object; its memory lives as long as the views of it."""
-        os.close(self.token)
-
     def remove(self) -> None:
         """Take the object away where it is still the same one, and wake all that wait."""
-        with suppress(FileNotFoundError):
-            if os.path.samestat(self.path.stat(), os.fstat(self.token)):
-                self.path.unlink()
+        remove_own(self.path, self.token)
         with suppress(TimeoutError):
             self.wake()
 
     def _leaving(self) -> int:
         """How many that were woken before have not left yet (glibc's __g_refs by the lowest bit of __wseq)."""
-        if _NEW_LAYOUT:
-            return 0
         first = self._numbers[0] & 1 ^ 1
-        return int(self._numbers[_REFERENCES_AT // 4 + first]) >> 1
+        return 0 if _NEW_LAYOUT else int(self._numbers[_REFERENCES_AT // 4 + first]) >> 1
 
-    def _result(self, code: int) -> Result:
+    def _taken(self, code: int) -> bool:
         """Of a call that takes the mutex, which its dead holder may have left."""
         if code == errno.EOWNERDEAD:
             _call("pthread_mutex_consistent", self._mutex)
         elif code not in (0, errno.ETIMEDOUT):
             raise OSError(code, os.strerror(code))
-        return Result.TIMEOUT if code == errno.ETIMEDOUT else Result.DONE
+        return code != errno.ETIMEDOUT
 
 
 def _call(name: str, *arguments: object) -> None:
-    code = getattr(_libc, name)(*arguments)
-    if code:
+    if code := getattr(_libc, name)(*arguments):
         raise OSError(code, f"{name}: {os.strerror(code)}")
 
 
-def _deadline(seconds: float) -> _Time:
-    at = time.monotonic_ns() + round(max(0.0, seconds) * 1e9)
-    return _Time(*divmod(at, 1_000_000_000))
+def _deadline(seconds: float) -> object:
+    return ctypes.byref(Time.of(time.monotonic() + max(0.0, seconds)))
 
 
 def _remove_orphan(path: Path) -> None:
@@ -216,6 +194,6 @@ def _remove_orphan(path: Path) -> None:
             fcntl.flock(token, fcntl.LOCK_EX | fcntl.LOCK_NB)
             path.unlink()
         except BlockingIOError:
-            raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: a living process uses it") from None
+            raise OSError("a living process uses it") from None
         finally:
             os.close(token)

@@ -8,18 +8,22 @@ import errno
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext
 from types import TracebackType
 from typing import Self
 
 from dodo_dsl.opendlv import posix_memory, sysv_memory
 from dodo_dsl.opendlv.posix_memory import PosixSegment
-from dodo_dsl.opendlv.sysv_memory import MemoryTakenError, Result, Segment, SharedMemoryError
+from dodo_dsl.opendlv.sysv_memory import Segment, SharedMemoryError
 
 __all__ = ["MemoryTakenError", "SharedMemory", "SharedMemoryError"]
 
 LOCK_PATIENCE = 5.0
 MODE = "CLUON_SHAREDMEMORY_POSIX"
+
+
+class MemoryTakenError(SharedMemoryError):
+    """Shared memory that its creator cannot use any more, as another process keeps its lock, or broke or removed it."""
 
 
 class SharedMemory:
@@ -69,13 +73,12 @@ class SharedMemory:
 
         The creator's error is a MemoryTakenError, here and wherever the memory turns out to be broken.
         """
-        deadline = time.monotonic() + timeout
-        result = Result.SIGNAL
-        while result is Result.SIGNAL:
+        deadline, is_taken = time.monotonic() + timeout, False
+        while not is_taken:
             with self._used() as segment:
-                result = segment.lock(deadline - time.monotonic())
-        if result is Result.TIMEOUT:
-            raise self._error(f"was locked by another for {timeout:g} s")
+                is_taken = segment.lock(deadline - time.monotonic())
+            if not is_taken and time.monotonic() >= deadline:
+                raise self._error(f"was locked by another for {timeout:g} s")
         self._locked = True
         try:
             yield
@@ -110,7 +113,7 @@ class SharedMemory:
         Raises SharedMemoryError when the creator has removed the memory.
         """
         with self._used() as segment:
-            return segment.wait(timeout) is Result.DONE
+            return segment.wait(timeout)
 
     def readers_waiting(self) -> int:
         """How many processes wait for a notification at this moment."""
@@ -134,7 +137,7 @@ class SharedMemory:
         self.buffer = memoryview(b"")
         if self._owner:
             self._segment.remove()
-        self._segment.close()
+        os.close(self._segment.token)
 
     def __enter__(self) -> Self:
         return self
@@ -171,6 +174,4 @@ def _wants_posix() -> bool:
 
 
 def _is_posix(name: str) -> bool:
-    with suppress(SharedMemoryError):
-        return posix_memory.path_of(name).exists()
-    return False
+    return (posix_memory.FOLDER / name.removeprefix("/")).exists()

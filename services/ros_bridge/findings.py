@@ -10,30 +10,27 @@ from dataclasses import dataclass
 from difflib import SequenceMatcher
 from pathlib import Path
 
-from dodo_dsl.opendlv.ros_types import RosGraph, Topic
-from services.ros_bridge.graph import PREFIX_BYTES, Discovered, Endpoint, listed
+from dodo_dsl.opendlv.ros_types import ACKERMANN_STAMPED, CAMERA_INFO, TWIST_STAMPED, RosGraph, Topic
+from services.ros_bridge.graph import Discovered, Endpoint, listed
 
 SETTLED, NAMELESS = 1.0, 5.0
 """Seconds without a change of the graph after which it is judged; nodes may give their names late."""
 PATIENCE, ALONE = 3.0, 15.0
 """Seconds for which a topic may lack its other end, and a graph any node."""
-AGE, AHEAD, ANOTHER_CLOCK = 2.0, 0.2, 600.0
-"""Seconds by which a stamp may lie before and after its message's arrival, and those of another clock."""
-COMMANDS = frozenset({"geometry_msgs/msg/TwistStamped", "ackermann_msgs/msg/AckermannDriveStamped"})
+AGE, AHEAD = 2.0, 0.2
+"""Seconds by which a stamp may lie before and after its message's arrival."""
+COMMANDS = frozenset({TWIST_STAMPED, ACKERMANN_STAMPED})
 """Types of which one without a stamp counts when it comes, as a Twist does; many nodes leave it out."""
 _NEAR = 0.6
 _MOST = 100
-_CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
-_LIMIT, _SOCKETS = Path("/proc/sys/net/core/rmem_max"), Path("/proc/net/udp")
-
-Key = tuple[object, ...]
+_SOCKETS = Path("/proc/net/udp")
 
 
 @dataclass(frozen=True)
 class Finding:
     """A sentence, said once for its key. An error keeps a test from its goal, a warning need not."""
 
-    key: Key
+    key: tuple[object, ...]
     text: str
     severity: str = "error"
 
@@ -50,19 +47,11 @@ def problems(graph: RosGraph, seen: Discovered, waited: float) -> Iterator[Findi
         for topic in topics:
             for other in seen.of(topic.topic, not given):
                 yield from _mismatch(topic, end_of(topic, given), other, seen.name(other))
-    for topic in graph.sent:
-        if len(publishers := seen.of(topic.topic, True)) > 1:
-            names = seen.name(*publishers)
-            who = f"{names} publish" if " and " in names else f"{names} has {len(publishers)} publishers"
-            yield Finding(("crowd", topic.topic), f"{who} on {topic.topic}: the last message counts; let one publish")
     if not seen.participants and not seen.left and waited >= ALONE:
         services = listed({f"'{name}'" for names in graph.services.values() for name in names})
         text = f"no ROS node is in the graph: the programs of {services or 'the application'} ended, or have another"
         yield Finding(("alone",), f"{text} domain (ROS_DOMAIN_ID), another network, or no DDS")
     elif seen.participants and waited >= PATIENCE:
-        if seen.participants - {guid[:PREFIX_BYTES] for guid in seen.endpoints}:
-            text = "a ROS program announced itself and none of its topics: it hangs, or ended while it started"
-            yield Finding(("silent",), text)
         yield from _missing(graph, seen)
 
 
@@ -85,11 +74,8 @@ def _missing(graph: RosGraph, seen: Discovered) -> Iterator[Finding]:
     is_heard = any(seen.of(topic.topic, False) for topic in graph.given)
     for given, topics in ((True, graph.given), (False, graph.sent)):
         verb = "listens to" if given else "publishes"
-        loose = [
-            each
-            for each in seen.endpoints.values()
-            if each.topic and each.writes != given and each.topic not in known and not seen.of(each.topic, given)
-        ]
+        ends = [each for each in seen.endpoints.values() if each.topic and each.writes != given]
+        loose = [each for each in ends if each.topic not in known and not seen.of(each.topic, given)]
         for topic in topics:
             lack, key = f"nobody {verb} {topic.topic} ({topic.type})", ("missing", topic.topic)
             if seen.of(topic.topic, not given):
@@ -98,7 +84,7 @@ def _missing(graph: RosGraph, seen: Discovered) -> Iterator[Finding]:
                 of = "" if other.type == topic.type else f" as {other.type}"
                 remap = f"remap it (--ros-args -r {other.topic}:={topic.topic}){' and change its type' if of else ''}"
                 yield Finding(key, f"{lack}; {seen.name(other)} {verb} {other.topic}{of}: {remap}")
-            elif topic.type != _CAMERA_INFO:
+            elif topic.type != CAMERA_INFO:
                 names = listed({f"'{name}'" for each in seen.participants for name in seen.nodes.get(each, ())})
                 rest = f"; the graph has {names or 'a node without a name'}"
                 yield Finding(key, lack, "warning") if given and is_heard else Finding(key, lack + rest)
@@ -121,36 +107,29 @@ def frame_problem(topic: Topic, frame_id: str, expected: str) -> str:
 def stamp_problem(topic: Topic, stamp_us: int, now_us: int) -> str:
     """Of a message's ``header.stamp``; empty for none."""
     age = (now_us - stamp_us) / 1e6
-    if stamp_us == 0 and topic.type in COMMANDS:
-        return ""
     if stamp_us == 0:
-        return f"{topic.topic} comes without a stamp; expected that of what it answers (header.stamp)"
+        missing = f"{topic.topic} comes without a stamp; expected that of what it answers (header.stamp)"
+        return "" if topic.type in COMMANDS else missing
     if -AHEAD <= age <= AGE:
         return ""
-    by = f"{abs(age):.2f} s" if abs(age) < 3600 else f"{abs(age) / 3600:.0f} h"
-    if abs(age) < ANOTHER_CLOCK:
-        return f"{topic.topic} comes with stamps {by} {'old' if age > 0 else 'ahead'}"
-    which = f"{by} {'behind' if age > 0 else 'ahead of'} the test's"
-    return f"the stamps of {topic.topic} are of another clock, {which}: copy header.stamp, or take the node's clock"
+    which = f"{abs(age):.1f} s {'behind' if age > 0 else 'ahead of'} the test's time"
+    return f"the stamps of {topic.topic} are {which}: copy header.stamp of what it answers, or take the node's clock"
 
 
 def loss(topic: Topic, node: str, size: int, lost: int) -> str:
     """Of pictures that do not fit into the buffer of a best-effort reader."""
-    limit = int(_LIMIT.read_text()) if _LIMIT.exists() else 0
-    remedy = f"'sudo sysctl -w net.core.rmem_max={4 * size}'" if limit < size else f"give it {4 * size} bytes"
     return (
         f"{lost} datagrams were lost: {node} hears {topic.topic} by best effort, and its receive buffer is smaller "
-        f"than a picture ({size} bytes): {remedy}, or subscribe reliably"
+        f"than a picture ({size} bytes): 'sudo sysctl -w net.core.rmem_max={4 * size}', or subscribe reliably"
     )
 
 
 def lost_datagrams() -> int:
     """How many the kernel dropped for full buffers at the ports of the domain (DDSI-RTPS, 9.6.1)."""
     lost, first = 0, 7400 + 250 * int(os.environ.get("ROS_DOMAIN_ID") or 0)
-    ports = range(first, first + 250)
     with contextlib.suppress(OSError):
         for words in map(str.split, _SOCKETS.read_text().splitlines()[1:]):
-            if len(words) > 12 and int(words[1].rpartition(":")[2], 16) in ports:
+            if len(words) > 12 and 0 <= int(words[1].rpartition(":")[2], 16) - first < 250:
                 lost += int(words[12])
     return lost
 
@@ -160,12 +139,10 @@ class Findings:
 
     def __init__(self, graph: RosGraph, seen: Discovered) -> None:
         self._graph, self._seen = graph, seen
-        self._said: set[Key] = set()
-        self._later: dict[Key, tuple[Topic, str]] = {}
-        self._left: dict[bytes, float] = {}
+        self._said: set[tuple[object, ...]] = set()
+        self._later: dict[tuple[str, str], tuple[Topic, str]] = {}
         self._lock = threading.RLock()
         self._changes, self._changed, self._first = 0, 0.0, 0.0
-        self._removals, self._removed = 0, 0.0
 
     def say(self, finding: Finding) -> None:
         with self._lock:
@@ -183,24 +160,18 @@ class Findings:
                 self._later.setdefault((kind, topic.topic), (topic, text))
 
     def look(self, now: float, last: bool = False) -> None:
-        """Judges the graph when it has settled, or at the ``last`` unless it ends; ``now`` in seconds."""
+        """Judges the graph when it has settled, or at the ``last``; ``now`` in seconds."""
         if not self._first or (self._seen.participants and not self._changes):
             self._first = now
         if self._seen.changes != self._changes:
             self._changes, self._changed = self._seen.changes, now
-        if self._seen.removals != self._removals:
-            self._removals, self._removed = self._seen.removals, now
         is_named = self._seen.participants <= self._seen.nodes.keys()
         if not last and now - self._changed < (SETTLED if is_named else NAMELESS):
             return
-        if not last or now - self._removed >= SETTLED:
+        if not last or not self._seen.left:  # at the end nodes may be going
             for finding in problems(self._graph, self._seen, now - self._first + last * ALONE):
                 self.say(finding)
         with self._lock:
             later, self._later = self._later, {}
         for key, (topic, text) in later.items():
             self.say(Finding(key, f"{text} (from {self._seen.name(*self._seen.of(topic.topic, True))})"))
-        for who in () if last else self._seen.left:
-            if now - self._left.setdefault(who, now) >= SETTLED and (names := self._seen.nodes.get(who)):
-                text = f"'{listed(names)}' left the ROS graph during the test: it ended or hangs"
-                self.say(Finding(("left", who), text, "warning"))

@@ -70,7 +70,6 @@ class Discovered:
     participants: set[bytes] = field(default_factory=set)
     left: set[bytes] = field(default_factory=set)
     changes: int = 0
-    removals: int = 0
 
     def add(self, endpoint: Endpoint) -> None:
         if len(self.endpoints) < _MOST:
@@ -167,7 +166,6 @@ class Graph:
                 if each.key.bytes[:PREFIX_BYTES] != self._own:
                     is_alive = each.sample_info.valid_data and each.sample_info.instance_state == InstanceState.Alive
                     self.seen.changes += 1
-                    self.seen.removals += not is_alive
                     yield each, is_alive
 
     def _made(self, kind: Any, own: Endpoint, depth: int) -> Any:

@@ -40,8 +40,6 @@ class Scenario(msgspec.Struct, kw_only=True):
     size: tuple[int, int] = (WIDTH, HEIGHT)
     seconds: float = 4.0
     environment: dict[str, str] | None = None
-    leaves: str = ""
-    """A peer that is ended after half of the time."""
     raw: list[tuple[str, str, str, int]] = []
     """Topic, type, bytes (hex) and how often they are sent after half of the time, at once, by a stranger."""
     loses_memory: bool = False
@@ -109,8 +107,6 @@ def _main(scenario: Scenario) -> Played:
         while time.monotonic() - begin < scenario.seconds and bridge.poll() is None:
             if not is_over and time.monotonic() - begin > scenario.seconds / 2:
                 is_over = True
-                if scenario.leaves:
-                    peers[scenario.leaves].terminate()
                 _shout(scenario.raw, Graph(Types()))
                 if scenario.loses_memory:
                     memory.close()

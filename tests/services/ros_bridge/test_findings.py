@@ -53,8 +53,6 @@ def graph_of(*ends: tuple[str, str, bool], node: str = "lane", seen: Discovered 
             graph_of(READS, ("/cmd_vel_stamped", "geometry_msgs/msg/TwistStamped", True)),
             ["/cmd_vel_stamped as geometry_msgs/msg/TwistStamped: remap it (--ros-args -r /cmd_vel_stamped:=/cmd_vel)"],
         ),
-        (graph_of(READS, WRITES, WRITES), ["'lane' has 2 publishers on /cmd_vel: the last message counts"]),
-        (graph_of(READS, WRITES, node="", seen=graph_of(WRITES)), ["'lane' and a program publish on /cmd_vel"]),
         (
             # a chain of two nodes has its own topics
             graph_of(
@@ -65,7 +63,7 @@ def graph_of(*ends: tuple[str, str, bool], node: str = "lane", seen: Discovered 
             ),
             [],
         ),
-        (graph_of(), ["announced itself and none of its topics", "/image", "/cmd_vel"]),
+        (graph_of(), ["/image", "/cmd_vel"]),
         (Discovered(), ["no ROS node is in the graph: the programs of 'lane' ended, or have another domain"]),
     ],
 )
@@ -99,12 +97,6 @@ def test_says_once_what_has_settled(capsys: pytest.CaptureFixture[str]) -> None:
     said.look(120.0 + PATIENCE)
     said.look(130.0)
     assert lines() == ["nobody publishes /cm"]
-    seen.participants.clear()
-    seen.left.add(b"lane".ljust(12))
-    said.look(131.0)
-    said.look(132.0)
-    said.look(133.0 + SETTLED)
-    assert lines() == ["'lane' left the ROS "]
     said.say_later("frame", GRAPH.sent[0], "something")
     said.look(133.5, last=True)
     assert lines() == ["something (from a no"]
@@ -117,7 +109,7 @@ def test_says_at_the_end_what_had_no_time_but_nothing_of_what_ends(
     seen = graph_of(READS)
     said = Findings(GRAPH, seen)
     said.look(100.0)
-    seen.removals += ended
+    seen.left |= {b"lane".ljust(12)} if ended else set()
     said.look(100.5, last=True)
     assert len(capsys.readouterr().out.splitlines()) == expected
 
@@ -138,9 +130,8 @@ def test_judges_stamps_and_frames() -> None:
         (0, "without a stamp"),
         (50_000_000, ""),
         (48_100_000, ""),
-        (45_000_000, "5.00 s old"),
-        (51_000_000, "1.00 s ahead"),
-        (4_000_000_000, "of another clock, 1 h ahead of the test's"),
+        (45_000_000, "5.0 s behind the test's time"),
+        (51_000_000, "1.0 s ahead of the test's time"),
     ):
         text = findings.stamp_problem(GRAPH.sent[0], stamp, 50_000_000)
         assert (said in text) and bool(said) == bool(text), stamp
@@ -149,13 +140,6 @@ def test_judges_stamps_and_frames() -> None:
     assert "in frame 'base'; expected 'laser'" in findings.frame_problem(GRAPH.sent[0], "base", "laser")
     drive = Topic(topic="/drive", type="ackermann_msgs/msg/AckermannDriveStamped", bus=GRAPH.sent[0].bus)
     assert not findings.stamp_problem(drive, 0, 50_000_000), "a command counts when it comes"
-
-
-def test_says_what_a_larger_buffer_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "limit").write_text("50\n")
-    monkeypatch.setattr(findings, "_LIMIT", tmp_path / "limit")
-    assert "net.core.rmem_max=400" in findings.loss(GRAPH.given[0], "'lane'", 100, 3)
-    assert "give it 160 bytes" in findings.loss(GRAPH.given[0], "'lane'", 40, 3)
 
 
 def test_counts_lost_datagrams_but_those_of_the_bus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,6 @@
 """The bridge with real ROS 2 nodes: every type both ways, the time, and what goes wrong, said in one line each."""
 
+import re
 import struct
 from pathlib import Path
 from typing import Any
@@ -140,7 +141,6 @@ WRONG = RosGraph(
     ),
     sent=(
         topic("/cmd_vel", TWIST, MOTION_REQUEST),
-        topic("/cmd_two", TWIST, MOTION_REQUEST),
         topic("/cmd_type", TWIST, MOTION_REQUEST),
         topic("/cmd_quality", TWIST, MOTION_REQUEST, reliability="reliable"),
         topic("/frame", POSE, POSE_ESTIMATE),
@@ -156,18 +156,15 @@ WRONG_PEERS = {
         end("/scan", SCAN),
         end("/map_scan", SCAN, durable=True),
         end("/cmd_vel_raw", TWIST, fields=VX),
-        end("/cmd_two", TWIST, fields=VX),
         end("/cmd_type", STAMPED, age=0.0, fields={}),
         end("/cmd_quality", TWIST, fields=VX, reliable=False),
     ],
     "teleop": [
-        end("/cmd_two", TWIST, fields=VX),
         end("/frame", POSE, age=0.0, fields={**QX, "header.frame_id": "camera"}),
         end("/unstamped", POSE, fields=QX),
         end("/old", POSE, age=7200.0, fields=QX),
         end("/nothing", TWIST, fields={"linear.x": "nan"}),
     ],
-    "short": [end("/elsewhere", TWIST, fields=VX)],
 }
 SENTENCES = [
     "nobody listens to /camera/image_raw (sensor_msgs/msg/Image); 'lane' listens to /image_raw: "
@@ -181,20 +178,18 @@ SENTENCES = [
     "write 'qos: {reliability: best_effort}' at the topic",
     "'lane' publishes /cmd_type as geometry_msgs/msg/TwistStamped, the test has geometry_msgs/msg/Twist: "
     "write one type in both ('ros: out')",
-    "'lane' and 'teleop' publish on /cmd_two: the last message counts; let one publish",
     "/frame comes in frame 'camera'; expected 'map' (from 'teleop')",
     "/unstamped comes without a stamp; expected that of what it answers (header.stamp) (from 'teleop')",
-    "the stamps of /old are of another clock, 2 h behind the test's: copy header.stamp, "
+    "the stamps of /old are 7200.N s behind the test's time: copy header.stamp of what it answers, "
     "or take the node's clock (from 'teleop')",
     "a message on /nothing is not taken: linear.x of /nothing is nan, "
     "which opendlv.proxy.GroundMotionRequest.vx (float) cannot be (from 'teleop')",
-    "'short' left the ROS graph during the test: it ended or hangs",
 ]
 
 
 def test_names_what_goes_wrong() -> None:
-    seen = played(Scenario(graph=WRONG, peers=WRONG_PEERS, messages=MESSAGES[:1], seconds=16, leaves="short"))
-    said = [sentence for _, sentence in seen.findings]
+    seen = played(Scenario(graph=WRONG, peers=WRONG_PEERS, messages=MESSAGES[:1], seconds=16))
+    said = [re.sub(r"7200\.\d", "7200.N", sentence) for _, sentence in seen.findings]
     assert set(said) ^ set(SENTENCES) == set()
     assert seen.code == 0
 
