@@ -12,7 +12,7 @@ from dodo_dsl.opendlv.recording import Recording
 
 OLD, NEW = "0.9", "1.0"
 
-TELLING = (1001, 1003, 1017, 1021, 1118, 1119, *range(1128, 1137), 1180, 1181)
+TELLING = (1001, 1003, 1017, 1118, 1119, *range(1128, 1137), 1180, 1181)
 """Ids that mean something else in the other set or nothing at all, as a payload shows."""
 _LOOKS = 500  # messages of each id that are looked at
 

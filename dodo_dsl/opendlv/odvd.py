@@ -10,10 +10,10 @@ Fields without an id are counted from 1 in their order. An error names file, lin
 
 import functools
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
 from dodo_dsl.opendlv import regular_file
 
@@ -35,43 +35,6 @@ class TextPlace(NamedTuple):
         return f"{self.file}:{self.line}:{self.column}"
 
 
-_TOKEN = re.compile(
-    r"""(?P<space>[ \t\r\n]+|//[^\n]*|/\*.*?\*/)
-      | (?P<name>[A-Za-z][A-Za-z0-9_]*(?:\.[A-Za-z][A-Za-z0-9_]*)*)
-      | (?P<number>[+-]?[0-9]+(?:\.[0-9]*)?)
-      | "(?P<string>[^"]*)"
-      | '(?P<char>[^'])'
-      | (?P<sign>[\[\]{};=,])""",
-    re.VERBOSE | re.DOTALL,
-)
-
-
-class Token(NamedTuple):
-    kind: str
-    text: str
-    place: TextPlace
-
-    def __str__(self) -> str:
-        return "the end of the file" if self.kind == "end" else f"'{self.text}'"
-
-
-def tokens(text: str, file: str) -> Iterator[Token]:
-    position, line, line_start = 0, 1, 0
-    while position < len(text):
-        match = _TOKEN.match(text, position)
-        if match is None:
-            place = TextPlace(file, line, position - line_start + 1)
-            raise OdvdError(f"{place}: '{text[position]}' is not allowed here")
-        kind = match.lastgroup or ""
-        if kind != "space":
-            yield Token(kind, match[kind], TextPlace(file, line, position - line_start + 1))
-        if newlines := match[0].count("\n"):
-            line += newlines
-            line_start = match.start() + match[0].rindex("\n") + 1
-        position = match.end()
-    yield Token("end", "", TextPlace(file, line, position - line_start + 1))
-
-
 INTEGER_BITS = {"char": 8} | {f"{kind}{bits}": bits for bits in (8, 16, 32, 64) for kind in ("uint", "int")}
 NUMBERS = frozenset(INTEGER_BITS) | {"bool", "float", "double"}
 SCALARS = NUMBERS | {"string", "bytes"}
@@ -85,28 +48,23 @@ def integer_range(type_: str) -> range:
     return range(-(2 ** (bits - 1)), 2 ** (bits - 1)) if type_.startswith("int") else range(2**bits)
 
 
-def default_of(type_: str, token: Token) -> Default:
-    """The default that a token gives a field of a type; raises OdvdError."""
-    kind, text = token.kind, token.text
-    if type_ == "bool" and kind == "name" and text in ("true", "false"):
-        return text == "true"
-    if type_ in ("float", "double") and kind == "number":
+def default_of(type_: str, text: str) -> Default:
+    """The default that is written for a field of a type; raises ValueError."""
+    if type_ == "bool":
+        return {"true": True, "false": False}[text]
+    if type_ in ("string", "bytes") and text[0] == '"':
+        return text[1:-1]
+    if type_ == "char" and text[0] == "'" and ord(text[1]) in integer_range(type_):
+        return ord(text[1])
+    if type_ in ("float", "double"):
         return float(text)
-    if type_ in ("string", "bytes") and kind == "string":
-        return text
-    if type_ == "char" and kind == "char" and ord(text) in integer_range(type_):
-        return ord(text)
-    is_whole = type_ in INTEGER_BITS and kind == "number" and re.fullmatch(r"[+-]?[0-9]{1,20}", text)
-    if is_whole and int(text) in integer_range(type_):
+    if type_ in INTEGER_BITS and int(text) in integer_range(type_):
         return int(text)
-    raise OdvdError(f"{token.place}: {token} is not a default for a field of type '{type_}'")
+    raise ValueError
 
-
-__all__ = ["Definition", "Field", "OdvdError", "TextPlace", "load", "parse"]
 
 MAX_FILE_BYTES = 1_000_000
 MAX_FIELD_NUMBER = 2**29 - 1
-RESERVED_NUMBERS = range(19_000, 20_000)  # kept by protobuf for itself
 MAX_MESSAGE_ID = 2**31 - 1
 
 
@@ -164,9 +122,8 @@ class Definition:
 
 def _form(type_: str) -> str:
     """What protobuf writes alike has the same form."""
-    if type_ in INTEGER_BITS:
-        return "int" if type_.startswith("int") else "uint"
-    return {"bool": "uint", "string": "bytes"}.get(type_, type_)
+    form = type_.rstrip("0123456789")
+    return {"char": "uint", "bool": "uint", "string": "bytes"}.get(form, form)
 
 
 def load(path: Path) -> tuple[Definition, ...]:
@@ -186,110 +143,96 @@ def shipped() -> tuple[Definition, ...]:
     return load(STANDARD)
 
 
+_QUOTED = r"""\"[^"]*\"|'[^']'"""
+_NAME = r"[A-Za-z][A-Za-z0-9_]*"
+_NAMES = rf"{_NAME}(?:\.{_NAME})*"
+_COMMENT = re.compile(rf"({_QUOTED})|//[^\n]*|/\*.*?\*/", re.DOTALL)
+_PACKAGE = re.compile(rf"\s*package\s+({_NAMES})\s*;")
+_HEAD = re.compile(rf"\s*message\s+(?P<name>{_NAMES})\s*\[\s*id\s*=\s*(\S*?)\s*,?\s*\]\s*\{{")
+_FIELD = re.compile(rf"\s*({_NAMES})\s+(?P<name>{_NAME})\s*(?:\[((?:{_QUOTED}|[^\]\"'])*)\])?\s*;")
+_OPTION = re.compile(rf"\s*(id|default)\s*=\s*({_QUOTED}|[^\s,]+)\s*,?")
+_END, _SPACE, _WORD = re.compile(r"\s*\}"), re.compile(r"\s*"), re.compile(r"\w+|.|\Z")
+
+
 def parse(text: str, file: str = "<odvd>") -> tuple[Definition, ...]:
     """The messages of a specification in their order; raises OdvdError."""
-    return _Parser(text, file).messages()
+    reader, found = _Reader(text, file), list[Definition]()
+    package = match[1] if (match := reader.has(_PACKAGE)) else ""
+    while not reader.is_at_end():
+        head, place = reader.take(_HEAD, "a message such as 'message Name [id = 1] {'")
+        id_, fields, counted = _id(head[2], MAX_MESSAGE_ID, place), list[Field](), 0
+        while not reader.has(_END):
+            match, at = reader.take(_FIELD, "a field such as 'float x [id = 1];', or '}'")
+            number, default = _options(match[1], match[3] or "", at)
+            counted += not number
+            fields.append(Field(match[2], match[1], number or counted, default, at))
+        _refuse_twins((each.place, each.name, each.number) for each in fields)
+        name = f"{package}.{head[1]}" if package else head[1]
+        found.append(Definition(name, id_, package, tuple(fields), place))
+    _refuse_twins((each.place, each.name, each.id) for each in found)
+    return tuple(found)
 
 
-class _Parser:
+class _Reader:
+    """Goes over a text, in which comments count as space."""
+
     def __init__(self, text: str, file: str) -> None:
-        self._stream = tokens(text, file)
-        self._token = next(self._stream)
+        self._text = _COMMENT.sub(lambda match: match[1] or re.sub(r"[^\n]", " ", match[0]), text)
+        self._file, self._at = file, 0
 
-    def messages(self) -> tuple[Definition, ...]:
-        package = ""
-        if self._has("name", "package"):
-            package = self._expect("name", "the package's name").text
-            self._sign(";")
-        found: list[Definition] = []
-        used: dict[str | int, TextPlace] = {}
-        while self._token.kind != "end":
-            message = self._message(package)
-            _use(used, "message", message.place, message.name, message.id)
-            found.append(message)
-        return tuple(found)
+    def has(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
+        """What comes, if it is this; then it is passed."""
+        match = pattern.match(self._text, self._at)
+        self._at = match.end() if match else self._at
+        return match
 
-    def _message(self, package: str) -> Definition:
-        if not self._has("name", "message"):
-            self._fail("'message'")
-        name = self._expect("name", "the message's name")
-        self._sign("[")
-        id_ = self._identifier(MAX_MESSAGE_ID)
-        self._has("sign", ",")
-        self._sign("]")
-        self._sign("{")
-        fields: list[Field] = []
-        used: dict[str | int, TextPlace] = {}
-        counted = 0
-        while not self._has("sign", "}"):
-            entry = self._field(counted + 1)
-            counted += self._is_counted
-            _use(used, "field", entry.place, entry.name, entry.number)
-            fields.append(entry)
-        full_name = f"{package}.{name.text}" if package else name.text
-        return Definition(full_name, id_, package, tuple(fields), name.place)
+    def is_at_end(self) -> bool:
+        self.has(_SPACE)
+        return self._at == len(self._text)
 
-    def _field(self, counted: int) -> Field:
-        type_ = self._expect("name", "a field's type or '}'").text
-        name = self._expect("name", "the field's name")
-        if "." in name.text:
-            raise OdvdError(f"{name.place}: the field name '{name.text}' has a dot, expected a simple name")
-        number, default = 0, None
-        if self._has("sign", "["):
-            while not self._has("sign", "]"):
-                if self._has("name", "default"):
-                    self._sign("=")
-                    default = default_of(type_, self._token)
-                    self._next()
-                else:
-                    number = self._identifier(MAX_FIELD_NUMBER)
-                self._has("sign", ",")
-        self._sign(";")
-        self._is_counted = not number
-        if (number or counted) in RESERVED_NUMBERS:
-            raise OdvdError(f"{name.place}: field ids 19000 to 19999 are reserved by protobuf")
-        return Field(name.text, type_, number or counted, default, name.place)
+    def take(self, pattern: re.Pattern[str], expected: str) -> tuple[re.Match[str], TextPlace]:
+        """What comes, and where its name is; raises OdvdError."""
+        self.has(_SPACE)
+        if (match := self.has(pattern)) is None:
+            word = _WORD.match(self._text, self._at)
+            found = f"'{word[0]}'" if word and word[0] else "the end of the file"
+            raise OdvdError(f"{self._place(self._at)}: expected {expected}, found {found}")
+        return match, self._place(match.start("name"))
 
-    def _identifier(self, maximum: int) -> int:
-        if not self._has("name", "id"):
-            self._fail("'id'")
-        self._sign("=")
-        token = self._expect("number", "a number")
-        if not re.fullmatch(r"[1-9][0-9]*", token.text) or int(token.text[:11]) > maximum:
-            raise OdvdError(f"{token.place}: expected an id, a whole number from 1 to {maximum}, found '{token.text}'")
-        return int(token.text)
-
-    def _next(self) -> None:
-        self._token = next(self._stream, self._token)
-
-    def _has(self, kind: str, text: str) -> bool:
-        """Whether this comes; then it is passed."""
-        is_there = (self._token.kind, self._token.text) == (kind, text)
-        if is_there:
-            self._next()
-        return is_there
-
-    def _expect(self, kind: str, what: str) -> Token:
-        token = self._token
-        if token.kind != kind:
-            self._fail(what)
-        self._next()
-        return token
-
-    def _sign(self, sign: str) -> None:
-        if not self._has("sign", sign):
-            self._fail(f"'{sign}'")
-
-    def _fail(self, expected: str) -> NoReturn:
-        raise OdvdError(f"{self._token.place}: expected {expected}, found {self._token}")
+    def _place(self, at: int) -> TextPlace:
+        return TextPlace(self._file, self._text.count("\n", 0, at) + 1, at - self._text.rfind("\n", 0, at))
 
 
-def _use(used: dict[str | int, TextPlace], what: str, place: TextPlace, name: str, id_: int) -> None:
-    """Note a name and an id; raises OdvdError where one is used a second time."""
-    keys: tuple[tuple[str, str | int], ...] = (("name", name), ("id", id_))
-    for key, value in keys:
-        if (earlier := used.setdefault(value, place)) is not place:
-            raise OdvdError(f"{place}: the {key} '{value}' of this {what} is already used at line {earlier.line}")
+def _options(type_: str, text: str, place: TextPlace) -> tuple[int, Default]:
+    """The id of a field, 0 without one, and its default."""
+    number, default, at = 0, None, 0
+    while text[at:].strip():
+        if (match := _OPTION.match(text, at)) is None:
+            raise OdvdError(f"{place}: expected 'id = 1' or 'default = 0' in brackets, found '{text.strip()}'")
+        at, value = match.end(), match[2]
+        if match[1] == "id":
+            number = _id(value, MAX_FIELD_NUMBER, place)
+            continue
+        try:
+            default = default_of(type_, value)
+        except (ValueError, KeyError):
+            raise OdvdError(f"{place}: {value} is not a default for a field of type '{type_}'") from None
+    return number, default
+
+
+def _id(text: str, maximum: int, place: TextPlace) -> int:
+    if not re.fullmatch(r"[1-9][0-9]{0,10}", text) or int(text) > maximum:
+        raise OdvdError(f"{place}: expected an id, a whole number from 1 to {maximum}, found '{text}'")
+    return int(text)
+
+
+def _refuse_twins(entries: Iterable[tuple[TextPlace, str, int]]) -> None:
+    """Raises OdvdError where a name or an id is used a second time."""
+    used: dict[str | int, TextPlace] = {}
+    for place, *keys in entries:
+        for key in keys:
+            if (earlier := used.setdefault(key, place)) is not place:
+                raise OdvdError(f"{place}: the name or id '{key}' is already used at line {earlier.line}")
 
 
 STANDARD = Path(__file__).with_name("messages.odvd")
