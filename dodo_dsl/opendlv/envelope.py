@@ -71,18 +71,10 @@ def decode_frame(frame: bytes, received: int | None = None) -> Envelope:
     end = HEADER_BYTES + body_length(frame)
     if len(frame) < end:
         raise FrameError(f"the frame has {len(frame)} bytes of {end}")
-    proto = _parsed(frame[HEADER_BYTES:end])
-    sent, sample_time = proto.sent, proto.sampleTimeStamp
+    data_type, payload, (s, us, r_s, r_us, t_s, t_us), stamp = decode_parts(frame[HEADER_BYTES:end])
     if received is None:
-        received = proto.received.seconds * MICROSECONDS + proto.received.microseconds
-    return Envelope(
-        proto.dataType,
-        proto.serializedData,
-        sent.seconds * MICROSECONDS + sent.microseconds,
-        received,
-        sample_time.seconds * MICROSECONDS + sample_time.microseconds,
-        proto.senderStamp,
-    )
+        received = r_s * MICROSECONDS + r_us
+    return Envelope(data_type, payload, s * MICROSECONDS + us, received, t_s * MICROSECONDS + t_us, stamp)
 
 
 def decode_parts(body: bytes) -> tuple[int, bytes, list[int], int]:
@@ -90,17 +82,12 @@ def decode_parts(body: bytes) -> tuple[int, bytes, list[int], int]:
 
     The numbers are seconds and microseconds of sent, received and sample time.
     """
-    proto = _parsed(body)
-    times = (proto.sent, proto.received, proto.sampleTimeStamp)
-    numbers = [number for time in times for number in (time.seconds, time.microseconds)]
-    return proto.dataType, proto.serializedData, numbers, proto.senderStamp
-
-
-def _parsed(body: bytes) -> Any:
     try:
         proto = _TYPE.FromString(body)
         if proto.ByteSize() != len(body):
             proto = _TYPE.FromString(wire.keep_first(body, LAYOUT.shape))
     except (DecodeError, wire.WireError) as error:
         raise FrameError(f"the frame holds no envelope: {error}") from None
-    return proto
+    sent, received, sampled = proto.sent, proto.received, proto.sampleTimeStamp
+    times = [sent.seconds, sent.microseconds, received.seconds, received.microseconds]
+    return proto.dataType, proto.serializedData, [*times, sampled.seconds, sampled.microseconds], proto.senderStamp

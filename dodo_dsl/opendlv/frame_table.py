@@ -4,6 +4,7 @@ Frames as libcluon writes them are read thousands at once; others one by one, wi
 """
 
 from enum import IntEnum
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,18 +38,13 @@ class Fact(IntEnum):
 Table = NDArray[np.int64]  # (len(Fact), frames)
 
 
-def empty() -> Table:
-    return np.zeros((len(Fact), 0), np.int64)
-
-
 def read_frames(data: bytes, starts: list[int], ends: list[int], known: bool = False) -> Table:
     """The rows of frames up to the first that holds no envelope; ``data`` ends with PADDING.
 
-    ``known`` frames were read before and are not checked again.
+    ``known`` frames were read before.
     """
     if len(starts) < FEW:
-        rows = _one_by_one(data, starts, ends, known)
-        return np.array(rows, np.int64).T if rows else empty()
+        return np.array(_one_by_one(data, starts, ends, known), np.int64).reshape(-1, len(Fact)).T
     table, usual = _at_once(data, np.array(starts, np.int64), np.array(ends, np.int64))
     for row in np.flatnonzero(~usual).tolist():
         found = _one_by_one(data, starts[row : row + 1], ends[row : row + 1], known)
@@ -60,17 +56,18 @@ def read_frames(data: bytes, starts: list[int], ends: list[int], known: bool = F
 
 def _one_by_one(data: bytes, starts: list[int], ends: list[int], known: bool) -> list[tuple[int, ...]]:
     """Rows up to the first frame that holds no envelope."""
-    rows = []
+    rows: list[tuple[int, ...]] = []
     for start, end in zip(starts, ends, strict=True):
-        if not _begins_well(data, start + HEADER_BYTES, end):
-            break
+        at = start + HEADER_BYTES
         try:
-            kind, payload, times, stamp = decode_parts(data[start + HEADER_BYTES : end])
-        except FrameError:
+            for _ in islice(wire.chunks(memoryview(data)[at:end]), FEW):
+                pass  # a false header may claim 16 MiB, and those are not copied
+            kind, payload, times, stamp = decode_parts(data[at:end])
+        except (FrameError, wire.WireError):
             break
         if not known and _is_doubtful(data, start, end):
             break
-        at = data.find(payload, start + HEADER_BYTES, end)
+        at = data.find(payload, at, end)
         rows.append((start, end, kind, at, at + len(payload), *times, stamp))
     return rows
 
@@ -91,24 +88,3 @@ def _is_doubtful(data: bytes, start: int, end: int) -> bool:
     if end + len(PADDING) >= len(data) or data.startswith(MAGIC, end) or data.find(MAGIC, start + 1, end) < 0:
         return False
     return encode_frame(decode_frame(data[start:end])) != data[start:end]
-
-
-def _begins_well(data: bytes, at: int, end: int) -> bool:
-    """Whether the first fields are within bounds: a false header may claim 16 MiB, and those are not copied."""
-    body = memoryview(data)[:end]
-    try:
-        for _ in range(FEW):
-            if at >= end:
-                return at == end
-            key, at = wire.read_varint(body, at)
-            wire_type = key & 7
-            if key < 8 or wire_type in (3, 4, 6, 7):
-                return False
-            if wire_type in (wire.VARINT, wire.DELIMITED):
-                value, at = wire.read_varint(body, at)
-                at += value if wire_type == wire.DELIMITED else 0
-            else:
-                at += 8 if wire_type == wire.EIGHT_BYTES else 4
-    except wire.WireError:
-        return False
-    return at <= end

@@ -20,13 +20,13 @@ class MessageError(ValueError):
 
 
 def encode(layout: Layout, message: Message) -> bytes:
-    """Every field in order, zeros and defaults too; raises MessageError for a number too large."""
+    """Every field in the order of numbers, zeros and defaults too; raises MessageError for a number too large."""
     if layout.narrow or layout.inner:
         _check_ranges(message, layout)
     data: bytes = message.SerializeToString()
     if len(data) != layout.fixed_size:
         data = layout.type.FromString(layout.filled + data).SerializeToString()
-    return wire.in_order(data, layout.shape) if layout.reorder else data
+    return data
 
 
 def decode(layout: Layout, payload: bytes) -> Any:

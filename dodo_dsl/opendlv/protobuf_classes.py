@@ -29,7 +29,7 @@ class Layout:
 
     ``filled`` is the encoding of a message with nothing set, every field written; ``fixed_size`` its length where
     that never varies. ``narrow`` are the integers of less than 32 bits, ``texts`` the strings, ``inner`` the fields
-    that are messages. ``reorder`` means that the fields are not declared in the order of their numbers.
+    that are messages.
     """
 
     type: type[Message]
@@ -40,7 +40,6 @@ class Layout:
     texts: tuple[str, ...]
     inner: Mapping[str, "Layout"]
     shape: Shape
-    reorder: bool
 
 
 def build(definitions: Iterable[Definition]) -> dict[str, Layout]:
@@ -116,7 +115,6 @@ def _field(field: Field, inner: Mapping[str, Layout]) -> "descriptor_pb2.FieldDe
 def _layout(definition: Definition, inner: Mapping[str, Layout], type_: type[Message]) -> Layout:
     filled = _filled(type_, inner)
     fields = definition.fields
-    numbers = [field.number for field in fields]
     return Layout(
         type=type_,
         definition=definition,
@@ -126,7 +124,6 @@ def _layout(definition: Definition, inner: Mapping[str, Layout], type_: type[Mes
         texts=tuple(field.name for field in fields if field.type == "string"),
         inner=inner,
         shape={f.number: inner[f.name].shape if f.name in inner else {} for f in fields},
-        reorder=numbers != sorted(numbers) or any(layout.reorder for layout in inner.values()),
     )
 
 

@@ -62,8 +62,6 @@ class Damage:
         self._end = offset + size
 
     def __str__(self) -> str:
-        if not self:
-            return "nothing was skipped"
         rest = f", and {self.count - 1} more positions, {self.size} bytes together" if self.count > 1 else ""
         return f"skipped {self.places[0]}{rest}"
 
@@ -97,7 +95,6 @@ class Batch:
         return times
 
     def select(self, rows: Numbers) -> "Batch":
-        """Some rows, in the order given."""
         return Batch(self.data, self.base, self.table[:, rows])
 
     def frames(self) -> Iterator[bytes]:
@@ -107,11 +104,9 @@ class Batch:
 
     def envelopes(self) -> Iterator[Envelope]:
         """The envelopes in the order of the rows."""
-        table = self.table
-        columns = (*table[Fact.DATA_TYPE : Fact.SENT_S], *self.times, table[Fact.SENDER_STAMP])
-        data = self.data
-        for kind, at, end, sent, received, sampled, stamp in zip(*(c.tolist() for c in columns), strict=True):
-            yield Envelope(kind, data[at:end], sent, received, sampled, stamp)
+        columns = (*self.table[Fact.DATA_TYPE : Fact.SENT_S], *self.times, self.table[Fact.SENDER_STAMP])
+        for kind, at, end, *times, stamp in zip(*(c.tolist() for c in columns), strict=True):
+            yield Envelope(kind, self.data[at:end], *times, stamp)
 
 
 class Scanner:
@@ -202,17 +197,8 @@ BATCH_FRAMES = 1 << 12
 BATCH_BYTES = 4 << 20
 _NEAR = 1 << 16  # bytes between frames that are read rather than jumped over
 
-_INDEX = np.dtype(
-    [
-        ("offset", "<i8"),
-        ("sampled", "<i8"),
-        ("time", "<i8"),
-        ("size", "<u4"),
-        ("data_type", "<i4"),
-        ("sender_stamp", "<u4"),
-    ],
-    align=False,
-)
+_COLUMNS = {"offset": "<i8", "sampled": "<i8", "time": "<i8", "size": "<u4", "data_type": "<i4", "sender_stamp": "<u4"}
+_INDEX = np.dtype(list(_COLUMNS.items()))
 
 
 class RecordingError(ValueError):
@@ -221,17 +207,11 @@ class RecordingError(ValueError):
     usage = True
 
 
-def read_envelopes(path: Path, damage: Callable[[Damage], None] | None = None) -> Iterator[Envelope]:
-    """The envelopes of a recording in file order; ``damage`` gets what was skipped at the end.
-
-    Memory is bounded by the largest frame, 16 MiB. Raises OSError for an unreadable file.
-    """
+def read_envelopes(path: Path) -> Iterator[Envelope]:
+    """The envelopes of a recording in file order; raises OSError for an unreadable file."""
     with regular_file.opened(path) as stream:
-        scanner = Scanner(stream)
-        for batch in scanner.batches():
+        for batch in Scanner(stream).batches():
             yield from batch.envelopes()
-    if damage is not None:
-        damage(scanner.damage)
 
 
 class Recording:
@@ -291,13 +271,12 @@ class Recording:
         """
         wanted = np.arange(len(self.index)) if rows is None else rows
         ends = np.cumsum(self.index["size"][wanted].astype(np.int64))
-        first = 0
+        first, behind = 0, 0
         while first < len(wanted):
-            behind = ends[first - 1] if first else 0
             most = int(np.searchsorted(ends, behind + BATCH_BYTES, "right"))
             last = max(first + 1, min(first + BATCH_FRAMES, most))
             yield self._gathered(wanted[first:last])
-            first = last
+            first, behind = last, int(ends[last - 1])
 
     def envelopes(self, rows: Numbers | None = None) -> Iterator[Envelope]:
         """The envelopes of some rows in the order given (by default all)."""

@@ -14,7 +14,6 @@ import socket
 import struct
 import time
 from collections.abc import Iterable, Iterator
-from types import TracebackType
 from typing import Self
 
 from google.protobuf.message import Message
@@ -41,23 +40,19 @@ Instruction = tuple[int, int, int, int]
 
 def attach_filter(
     receiver: socket.socket, ids: Iterable[int], of_others: Iterable[int] = (), than: Iterable[Address] = ()
-) -> bool:
-    """Passes only messages with these ids, and datagrams that do not begin with an id; False if the kernel cannot.
+) -> None:
+    """Passes only messages with these ids, and datagrams that do not begin with an id, where the kernel can.
 
     Messages with ids ``of_others`` pass unless they come from addresses in ``than``. Dropped datagrams count as lost in
     the kernel's counter of the socket.
     """
     program = [*_program(ids, of_others, than)]
     if len(program) > _MOST:
-        return False
+        return
     code = ctypes.create_string_buffer(b"".join(_INSTRUCTION.pack(*each) for each in program))
-    try:
-        receiver.setsockopt(
-            socket.SOL_SOCKET, _SO_ATTACH_FILTER, struct.pack("@HP", len(program), ctypes.addressof(code))
-        )
-    except OSError:
-        return False
-    return True
+    with contextlib.suppress(OSError):
+        filter_ = struct.pack("@HP", len(program), ctypes.addressof(code))
+        receiver.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, filter_)
 
 
 def _program(ids: Iterable[int], of_others: Iterable[int], than: Iterable[Address]) -> Iterator[Instruction]:
@@ -88,8 +83,6 @@ def _passing(encoded: bytes) -> Iterator[Instruction]:
 
 MAX_DATAGRAM_BYTES = 65_507
 CIDS = range(1, 255)
-_ROOMY = 4_000_000
-"""Bytes of a receive buffer that hold what a fast bus carries while messages gather."""
 MAX_DROPPED = 1000  # before a flood of garbage can end a wait
 _NO_ROUTE = (errno.ENODEV, errno.ENETUNREACH)
 _ID_PLACE, _ID_TAG = 5, 0x08  # behind the frame's header, the envelope's first field
@@ -136,12 +129,13 @@ class Session:
             hint = " (is there a route to 224.0.0.0/4?)" if error.errno in _NO_ROUTE else ""
             raise SessionError(f"the bus {bus[0]}:{bus[1]} cannot be joined: {error.strerror}{hint}") from None
         self._bus = bus
-        self._gathers, self._may_gather = 0.0, False
+        self.gathers_s = 0.0
+        """Seconds in which messages gather after some were received, so that this process wakes once for several."""
+        self._may_gather = False
         self.hears_directly = False
         """Whether it receives what others send to its own address."""
-        self._pending: dict[socket.socket, Envelope] = {}
+        self._pending: dict[socket.socket, tuple[Envelope, Address]] = {}
         """In the order of arrival across both sockets: what one has while the other may have something older."""
-        self._sources: dict[socket.socket, Address] = {}
         self._dropped: dict[socket.socket, int] = {}
         self._buffer = bytearray(MAX_DATAGRAM_BYTES + 1)
         self._view = memoryview(self._buffer)
@@ -183,14 +177,6 @@ class Session:
                 self._sender.sendto(frame, address)
         return frame
 
-    def gather(self, seconds: float) -> None:
-        """Lets messages gather after some were received, so that this process wakes once for several.
-
-        Not where the kernel grants so small a buffer that it would be full meanwhile.
-        """
-        room = self._receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
-        self._gathers = seconds if room >= _ROOMY else 0.0
-
     def receive(self, timeout: float | None = 0.0) -> Envelope | None:
         """The next envelope of another member, with ``received`` set; None when ``timeout`` seconds are over.
 
@@ -215,9 +201,9 @@ class Session:
         """The file descriptor to select on for reading."""
         return self._receiver.fileno()
 
-    def filenos(self) -> tuple[int, ...]:
+    def filenos(self) -> list[int]:
         """As ``fileno``, with that of its own address if it ``hears_directly``."""
-        return (self._receiver.fileno(), *([self._sender.fileno()] if self.hears_directly else []))
+        return [each.fileno() for each in self._sources()]
 
     def hear_only(
         self, ids: Iterable[int], of_others: Iterable[int] = (), than: Iterable[Address] = frozenset()
@@ -251,11 +237,6 @@ class Session:
             self._receiver.setsockopt(socket.IPPROTO_IP, socket.IP_DROP_MEMBERSHIP, membership)
             self.is_member = False
 
-    @property
-    def port(self) -> int:
-        """From which this session's datagrams come."""
-        return self.address[1]
-
     def close(self) -> None:
         """Leave the bus."""
         self._receiver.close()
@@ -264,9 +245,7 @@ class Session:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _joined(self, bus: Address) -> socket.socket:
@@ -287,19 +266,22 @@ class Session:
         if not self.hears_directly and not self._pending:
             self.was_direct = False
             return self._take(self._receiver)
-        sources = (self._receiver, self._sender) if self.hears_directly else (self._receiver,)
-        for source in sources:
+        for source in self._sources():
             if source not in self._pending:
                 with contextlib.suppress(BlockingIOError):
                     envelope = self._take(source)
                     if envelope is None:
                         return None  # what comes behind it may be older than what the other socket has
-                    self._pending[source], self._sources[source] = envelope, self.source
+                    self._pending[source] = envelope, self.source
         if not self._pending:
             raise BlockingIOError
-        first = min(self._pending, key=lambda source: self._pending[source].received)
-        self.source, self.was_direct = self._sources[first], first is self._sender
-        return self._pending.pop(first)
+        first = min(self._pending, key=lambda source: self._pending[source][0].received)
+        envelope, self.source = self._pending.pop(first)
+        self.was_direct = first is self._sender
+        return envelope
+
+    def _sources(self) -> tuple[socket.socket, ...]:
+        return (self._receiver, self._sender) if self.hears_directly else (self._receiver,)
 
     def _take(self, receiver: socket.socket) -> Envelope | None:
         size, ancillary, _, address = receiver.recvmsg_into([self._buffer], _ANCILLARY_BYTES, socket.MSG_DONTWAIT)
@@ -319,9 +301,9 @@ class Session:
 
     def _wait(self, deadline: float | None) -> bool:
         left = math.inf if deadline is None else deadline - time.monotonic()
-        if left > 0 and self._may_gather and self._gathers:
+        if left > 0 and self._may_gather and self.gathers_s:
             self._may_gather = False
-            time.sleep(min(self._gathers, left))
+            time.sleep(min(self.gathers_s, left))
             return True
         return left > 0 and bool(self._poll.poll(None if deadline is None else left * 1000))
 
@@ -330,9 +312,8 @@ def datagram(envelope: Envelope) -> bytes:
     """The frame of an envelope; raises FrameError, and SessionError above 65,507 bytes."""
     frame = encode_frame(envelope)
     if len(frame) > MAX_DATAGRAM_BYTES:
-        raise SessionError(
-            f"message {envelope.data_type} needs {len(frame)} bytes of {MAX_DATAGRAM_BYTES} in a datagram"
-        )
+        what = f"message {envelope.data_type} needs {len(frame)} bytes of {MAX_DATAGRAM_BYTES} in a datagram"
+        raise SessionError(what)
     return frame
 
 

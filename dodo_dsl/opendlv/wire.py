@@ -3,55 +3,53 @@
 Reference: Protocol Buffers, "Encoding".
 """
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 VARINT, EIGHT_BYTES, DELIMITED, FOUR_BYTES = 0, 1, 2, 5
 MAX_VARINT_BYTES = 10
 MAX_NESTING = 32
 
-Shape = Mapping[int, "Shape"]  # field numbers in order of declaration; that of a message has its own shape
+Bytes = bytes | bytearray | memoryview
+Shape = Mapping[int, "Shape"]  # by field numbers; that of a message has its own shape
 
 
 class WireError(ValueError):
     """Bytes that are not protobuf's encoding of fields."""
 
 
-@dataclass(frozen=True)
-class Chunk:
+class Chunk(NamedTuple):
     """One field on the wire: ``head`` is its key (and length), ``body`` its value."""
 
     number: int
     wire_type: int
-    head: bytes
-    body: bytes
+    head: Bytes
+    body: Bytes
 
 
-def chunks(data: bytes) -> Iterator[Chunk]:
-    """The fields of ``data`` in their order; raises WireError."""
+def chunks(data: Bytes) -> Iterator[Chunk]:
+    """The fields of ``data`` in their order, without a copy of a memoryview; raises WireError."""
     position = 0
     while position < len(data):
         start = position
-        key, position = read_varint(data, position)
+        key, begin = read_varint(data, start)
         number, wire_type = key >> 3, key & 7
         if wire_type == VARINT:
-            value_start = position
-            _, end = read_varint(data, position)
+            _, end = read_varint(data, begin)
         elif wire_type == DELIMITED:
-            length, value_start = read_varint(data, position)
-            end = value_start + length
+            length, begin = read_varint(data, begin)
+            end = begin + length
         elif wire_type in (EIGHT_BYTES, FOUR_BYTES):
-            value_start = position
-            end = position + (8 if wire_type == EIGHT_BYTES else 4)
+            end = begin + (8 if wire_type == EIGHT_BYTES else 4)
         else:
             raise WireError(f"wire type {wire_type} at byte {start}")
         if not 0 < number < 2**29 or end > len(data):
             raise WireError(f"field {number} at byte {start} is cut or has no number")
-        yield Chunk(number, wire_type, data[start:value_start], data[value_start:end])
+        yield Chunk(number, wire_type, data[start:begin], data[begin:end])
         position = end
 
 
-def read_varint(data: bytes | bytearray | memoryview, position: int) -> tuple[int, int]:
+def read_varint(data: Bytes, position: int) -> tuple[int, int]:
     """The number at ``position`` and the position after it."""
     value = shift = 0
     for index in range(position, min(position + MAX_VARINT_BYTES, len(data))):
@@ -83,24 +81,13 @@ def varint(value: int) -> bytes:
     return bytes(out)
 
 
-def keep_first(data: bytes, shape: Shape) -> bytes:
+def keep_first(data: Bytes, shape: Shape) -> bytes:
     """``data`` with only the first occurrence of each field, inside of messages too."""
     found: dict[int, bytes] = {}
-    for chunk in chunks(data):
-        if chunk.number not in found:
-            found[chunk.number] = _rewritten(chunk, shape, keep_first)
+    for number, wire_type, head, body in chunks(data):
+        if number not in found:
+            found[number] = bytes(head) + bytes(body)
+            if wire_type == DELIMITED and (inner := shape.get(number)):
+                kept = keep_first(body, inner)
+                found[number] = varint(number << 3 | DELIMITED) + varint(len(kept)) + kept
     return b"".join(found.values())
-
-
-def in_order(data: bytes, shape: Shape) -> bytes:
-    """``data``, which has every field once, with its fields in the shape's order."""
-    found = {chunk.number: _rewritten(chunk, shape, in_order) for chunk in chunks(data)}
-    return b"".join(found[number] for number in shape)
-
-
-def _rewritten(chunk: Chunk, shape: Shape, rewrite: Callable[[bytes, Shape], bytes]) -> bytes:
-    inner = shape.get(chunk.number)
-    if chunk.wire_type != DELIMITED or not inner:
-        return chunk.head + chunk.body
-    body = rewrite(chunk.body, inner)
-    return varint(chunk.number << 3 | DELIMITED) + varint(len(body)) + body

@@ -144,7 +144,6 @@ def test_nested_messages_and_fields_out_of_order(message_set: Callable[[str], Me
     outer_message = outer(n=-1)
     outer_message.late.a = 5
     payload = messages.encode(outer_message)
-    assert payload.hex() == "1a0410000805" + "0a0408001000" + "1001"
     assert messages.encode(messages.decode(3001, payload)) == payload
     doubled = messages.decode(3001, bytes.fromhex("1a04080510071a020806"))
     assert (doubled.late.a, doubled.late.b) == (5, 7)

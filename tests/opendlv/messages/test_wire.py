@@ -1,4 +1,4 @@
-"""Fields on protobuf's wire: split, put in order and made unique without their message class."""
+"""Fields on protobuf's wire: split and made unique without their message class."""
 
 import pytest
 from google.protobuf.internal import encoder
@@ -81,12 +81,3 @@ def test_the_first_of_equal_fields_counts_inside_of_messages_too() -> None:
     once = field(2, DELIMITED, field(1, VARINT, b"\x01")) + field(3, VARINT, b"\x05")
     assert wire.keep_first(data, {2: {1: {}}, 3: {}}) == once
     assert wire.keep_first(data, {2: {}, 3: {}}) == field(2, DELIMITED, inner) + field(3, VARINT, b"\x05")
-
-
-def test_fields_come_in_the_order_of_their_declaration() -> None:
-    first, second = (
-        field(9, VARINT, b"\x01"),
-        field(1, DELIMITED, field(4, VARINT, b"\x02") + field(2, VARINT, b"\x03")),
-    )
-    ordered = field(1, DELIMITED, field(2, VARINT, b"\x03") + field(4, VARINT, b"\x02"))
-    assert wire.in_order(first + second, {1: {2: {}, 4: {}}, 9: {}}) == ordered + first

@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 
 from dodo_dsl.opendlv import recording as recordings
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.recording import MAX_PLACES, Damage, DamagePlace, Recording, RecordingError, read_envelopes
+from dodo_dsl.opendlv.recording import (
+    MAX_PLACES,
+    Damage,
+    DamagePlace,
+    Recording,
+    RecordingError,
+    Scanner,
+    read_envelopes,
+)
 from tests.opendlv import vectors
 
 envelopes = vectors.ENVELOPES | vectors.ENVELOPES.map(lambda envelope: envelope._replace(sample_time=0))
@@ -33,9 +41,11 @@ def write(folder: Path, data: bytes) -> Path:
 
 
 def read(path: Path) -> tuple[list[Envelope], Damage]:
-    told: list[Damage] = []
-    found = list(read_envelopes(path, told.append))
-    return found, told[0]
+    with path.open("rb") as stream:
+        scanner = Scanner(stream)
+        found = [envelope for batch in scanner.batches() for envelope in batch.envelopes()]
+    assert found == list(read_envelopes(path))
+    return found, scanner.damage
 
 
 @pytest.fixture(scope="module", params=[16, recordings.CHUNK_BYTES])
