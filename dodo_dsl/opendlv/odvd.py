@@ -229,8 +229,8 @@ def _id(text: str, maximum: int, place: TextPlace) -> int:
 def _refuse_twins(entries: Iterable[tuple[TextPlace, str, int]]) -> None:
     """Raises OdvdError where a name or an id is used a second time."""
     used: dict[str | int, TextPlace] = {}
-    for place, *keys in entries:
-        for key in keys:
+    for place, name, id_ in entries:
+        for key in (name, id_):
             if (earlier := used.setdefault(key, place)) is not place:
                 raise OdvdError(f"{place}: the name or id '{key}' is already used at line {earlier.line}")
 

@@ -44,39 +44,25 @@ def view(data: Any, format_: str, width: int, height: int) -> Picture:
     return flat[:wanted].reshape(shape)
 
 
-_TO_BGR = {"argb": "COLOR_BGRA2BGR", "i420": "COLOR_YUV2BGR_I420", "rgb": "COLOR_RGB2BGR"}
-_TO_I420 = {"argb": "COLOR_BGRA2YUV_I420", "bgr": "COLOR_BGR2YUV_I420", "rgb": "COLOR_RGB2YUV_I420"}
-_FROM_BGR = {"argb": "COLOR_BGR2BGRA", "i420": "COLOR_BGR2YUV_I420", "rgb": "COLOR_BGR2RGB"}
-_FROM_ARGB = {"bgr": "COLOR_BGRA2BGR", "rgb": "COLOR_BGRA2RGB"}
+_ORDERS = {"argb": "BGRA", "bgr": "BGR", "rgb": "RGB", "rgba": "RGBA", "mono": "GRAY", "i420": "YUV_I420"}
 
 
-def to_bgr(picture: Picture, format_: str) -> Picture:
-    """An image as blue, green, red (height, width, 3)."""
-    return _converted(picture, _TO_BGR.get(format_))
+def converted(picture: Picture, had: str, wanted: str) -> Picture:
+    """A copy of an image in another format, shaped as ``view`` has it, or ``rgba`` or ``mono``; alpha is 255.
 
-
-def to_i420(picture: Picture, format_: str) -> Picture:
-    """An image as i420, shaped as ``view`` has it; raises PixelError if width or height are odd."""
-    if format_ == "i420":
+    Raises PixelError for i420 with an odd width or height.
+    """
+    if had == wanted:
         return picture.copy()
-    size("i420", picture.shape[1], picture.shape[0])
-    return _converted(picture, _TO_I420[format_])
+    if wanted == "i420":
+        size(wanted, picture.shape[1], picture.shape[0])
+    import cv2
 
-
-def from_bgr(picture: Picture, format_: str) -> Picture:
-    """An image of blue, green, red in another format, shaped as ``view`` has it; alpha is 255."""
-    return _converted(picture, _FROM_BGR.get(format_))
+    code = f"YUV2{_ORDERS[wanted]}_I420" if had == "i420" else f"{_ORDERS[had]}2{_ORDERS[wanted]}"
+    return np.asarray(cv2.cvtColor(picture, getattr(cv2, f"COLOR_{code}")), np.uint8)
 
 
 def with_copies(argb: Picture, i420: Picture | None, formats: Iterable[str]) -> dict[str, Picture]:
     """An image by its formats: the two that there are, and those of ``formats`` that have to be made of argb."""
     pictures = {"argb": argb} if i420 is None else {"argb": argb, "i420": i420}
-    return pictures | {each: _converted(argb, _FROM_ARGB[each]) for each in formats if each in _FROM_ARGB}
-
-
-def _converted(picture: Picture, code: str | None) -> Picture:
-    if code is None:
-        return picture.copy()
-    import cv2
-
-    return np.asarray(cv2.cvtColor(picture, getattr(cv2, code)), np.uint8)
+    return {each: converted(argb, "argb", each) for each in formats if each not in ("argb", "i420")} | pictures

@@ -105,8 +105,8 @@ class Batch:
     def envelopes(self) -> Iterator[Envelope]:
         """The envelopes in the order of the rows."""
         columns = (*self.table[Fact.DATA_TYPE : Fact.SENT_S], *self.times, self.table[Fact.SENDER_STAMP])
-        for kind, at, end, *times, stamp in zip(*(c.tolist() for c in columns), strict=True):
-            yield Envelope(kind, self.data[at:end], *times, stamp)
+        for kind, at, end, sent, received, sampled, stamp in zip(*(c.tolist() for c in columns), strict=True):
+            yield Envelope(kind, self.data[at:end], sent, received, sampled, stamp)
 
 
 class Scanner:

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from dodo_dsl.opendlv.picture_size import problem_of, too_large
-from dodo_dsl.opendlv.pixels import Picture
+from dodo_dsl.opendlv.pixels import Picture, converted
 from dodo_dsl.opendlv.ros_codec import Fields, RosTypeError
 from dodo_dsl.opendlv.ros_types import CAMERA_INFO, COMPRESSED, IMAGE, CameraView, Topic
 
 PICTURES = (IMAGE, COMPRESSED)
-_SAME = {"argb": "bgra8", "bgr": "bgr8", "rgb": "rgb8"}
-_ORDER = {"bgr8": "BGR", "rgb8": "RGB", "bgra8": "BGRA", "rgba8": "RGBA", "mono8": "GRAY"}
+_FORMATS = {"bgr8": "bgr", "rgb8": "rgb", "bgra8": "argb", "rgba8": "rgba", "mono8": "mono"}
+_BYTES = {"mono8": 1, "bgr8": 3, "rgb8": 3}
 _ENCODINGS = {IMAGE: ("bgr8", "rgb8", "bgra8", "mono8"), COMPRESSED: ("png", "jpeg")}
 """Of topics that are given, the default first."""
 
@@ -30,18 +30,16 @@ class CameraPicture(NamedTuple):
 
 def picture_fields(topic: Topic, picture: CameraPicture | None) -> Fields:
     """The fields of a picture, or of what is known of its camera, without the header; raises RosTypeError."""
-    import cv2
-
     if topic.type == CAMERA_INFO and topic.camera:
         return _camera_info(topic.camera)
     if picture is None:
         raise RosTypeError(f"{topic.topic} needs a picture, or its camera")
     encoding = encoding_of(topic)
-    image, is_compressed = picture.pixels, topic.type == COMPRESSED
-    had, wanted = _SAME[picture.format], "bgr8" if is_compressed else encoding
-    if had != wanted:
-        image = np.asarray(cv2.cvtColor(image, getattr(cv2, f"COLOR_{_ORDER[had]}2{_ORDER[wanted]}")), np.uint8)
-    if is_compressed:
+    wanted = _FORMATS.get(encoding, "bgr")
+    image = picture.pixels if picture.format == wanted else converted(picture.pixels, picture.format, wanted)
+    if topic.type == COMPRESSED:
+        import cv2
+
         return {"format": encoding, "data": cv2.imencode(f".{encoding}", image)[1]}
     height, width = image.shape[:2]
     return {"height": height, "width": width, "encoding": encoding, "step": image.nbytes // height, "data": image}
@@ -57,27 +55,25 @@ def encoding_of(topic: Topic) -> str:
 
 def picture_of(type_: str, fields: Fields) -> Picture:
     """The picture of an Image or a CompressedImage as blue, green, red; raises RosTypeError."""
-    import cv2
-
     data = fields["data"]
     if type_ == COMPRESSED:
+        import cv2
+
         problem = problem_of(data.tobytes())
         found = None if problem else cv2.imdecode(data, cv2.IMREAD_COLOR)
         if found is None:
             raise RosTypeError(f"a picture of format '{fields['format']:.40}' cannot be read: {problem}")
         return np.asarray(found, np.uint8)
     encoding, width, height, step = (fields[name] for name in ("encoding", "width", "height", "step"))
-    if encoding not in _ORDER:
-        raise RosTypeError(f"a picture has the encoding '{encoding:.40}', expected one of {', '.join(_ORDER)}")
-    row = width * (1 if encoding == "mono8" else len(_ORDER[encoding]))
+    if encoding not in _FORMATS:
+        raise RosTypeError(f"a picture has the encoding '{encoding:.40}', expected one of {', '.join(_FORMATS)}")
+    row = width * _BYTES.get(encoding, 4)
     problem = too_large(width, height)
     if problem or not 0 < row <= step or not 0 < height * step <= len(data):
         of = f"{len(data)} bytes in rows of {step} are no {encoding} of {width} x {height} pixels"
         raise RosTypeError(problem or of)
     image = data[: height * step].reshape(height, step)[:, :row].reshape(height, width, -1)
-    if encoding == "bgr8":
-        return np.asarray(image, np.uint8)
-    return np.asarray(cv2.cvtColor(image, getattr(cv2, f"COLOR_{_ORDER[encoding]}2BGR")), np.uint8)
+    return np.asarray(image, np.uint8) if encoding == "bgr8" else converted(image, _FORMATS[encoding], "bgr")
 
 
 def _camera_info(camera: CameraView) -> Fields:

@@ -86,7 +86,7 @@ class Later:
         """Keep a picture, in the room that i420 takes; raises VideoError, also for an earlier picture."""
         kind, width, height = taken.layout
         try:
-            picture = pixels.to_i420(taken.picture, kind)
+            picture = pixels.converted(taken.picture, kind, "i420")
         except pixels.PixelError as error:
             raise VideoError(str(error)) from None
         self._waiting.append((camera, taken._replace(picture=picture, layout=("i420", width, height))))

@@ -87,7 +87,6 @@ def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
         pictures = truth_file.read(path, frames)
     except truth_file.NoBoxes:
         return  # reported by the rule on empty files
-    yield from truth_file.corners(path)
     labels, known = {label for boxes in pictures.values() for label, _ in boxes}, truth_file.categories(path)
     for name in settings["classes"].split(","):
         if name in known and name not in labels:  # others are reported by the rule on names

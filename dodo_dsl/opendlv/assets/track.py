@@ -37,7 +37,6 @@ class VehicleBox:
 
 
 def outline(pose: VehiclePose, box: VehicleBox) -> shapely.Polygon:
-    """The rectangle that the vehicle covers at a pose."""
     return shapely.Polygon(corners(pose, box))
 
 
@@ -59,8 +58,7 @@ def swept(start: VehiclePose, end: VehiclePose, box: VehicleBox) -> shapely.Geom
     """
     change = math.remainder(end.heading - start.heading, math.tau)
     parts = max(1, math.ceil(abs(change) / TURN))
-    shares = [index / parts for index in range(parts + 1)]
-    rings = [corners(between(start, end, share), box) for share in shares]
+    rings = [corners(between(start, end, index / parts), box) for index in range(parts + 1)]
     hulls = [shapely.convex_hull(shapely.linestrings(a + b)) for a, b in pairwise(rings)]
     return hulls[0] if parts == 1 else shapely.union_all(hulls)
 
@@ -90,7 +88,6 @@ class Gates:
 
     @property
     def next(self) -> Gate | None:
-        """The next gate; None when all were crossed."""
         return self._gates[self.crossed] if self.crossed < len(self) else None
 
     def move(self, start: VehiclePose, end: VehiclePose) -> float | None:
@@ -268,17 +265,8 @@ def place(pose: VehiclePose) -> str:
 
 
 def load_obstacles(path: Path) -> dict[str, shapely.MultiLineString]:
-    """The obstacles of the map in a folder (its `map.json`) or of the map file itself, by name, in metres.
-
-    Obstacles of one name are one. Raises InputError.
-    """
+    """The obstacles of a map by name, as ``map_file.read_obstacles`` has them; raises InputError."""
     return {name: shapely.MultiLineString(lines) for name, lines in map_file.read_obstacles(path).items()}
-
-
-def load_blocks(path: Path, height: float) -> dict[str, shapely.Geometry]:
-    """The ground that the blocks of each name stand on, as far as a vehicle of ``height`` m may touch them."""
-    found = map_file.read_footprints(path, height)
-    return {name: shapely.union_all([shapely.Polygon(each) for each in outlines]) for name, outlines in found.items()}
 
 
 Shape = TypeVar("Shape", bound=shapely.Geometry)
@@ -286,13 +274,13 @@ Shape = TypeVar("Shape", bound=shapely.Geometry)
 
 def pick(known: Mapping[str, Shape], names: Sequence[str], parameter: str, path: Path) -> dict[str, Shape]:
     """Those obstacles that a parameter names, prepared for many queries; ValueError for an unknown name."""
-    chosen = {}
     for name in names:
         if name not in known:
-            raise ValueError(f"--{parameter}: {_unknown(name, list(known), path)}")
+            close = difflib.get_close_matches(name, known, n=1)
+            hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(sorted(known)) or 'none'}"
+            raise ValueError(f"--{parameter}: the map {path} has no obstacle {name!r}; {hint}")
         shapely.prepare(known[name])
-        chosen[name] = known[name]
-    return chosen
+    return {name: known[name] for name in names}
 
 
 EVERY, BLOCKS = "*", "blocks"
@@ -306,24 +294,17 @@ def pick_walls(
 
     Raises ValueError for a name that is neither, and if nothing stands in the vehicle's path.
     """
-    blocks = {} if all(name in known or name == EVERY for name in names) else load_blocks(path, height)
-    standing = {name: area for name, area in blocks.items() if not area.is_empty}
+    outlines = {} if all(name in known or name == EVERY for name in names) else map_file.read_footprints(path, height)
+    areas = {name: [shapely.Polygon(each) for each in found] for name, found in outlines.items() if found}
+    standing = {name: shapely.union_all(each) for name, each in areas.items()}
     groups = {EVERY: [name for name in known if name not in others], BLOCKS: list(standing)}
     shapes = {**standing, **known}
     for name in names:
-        if name not in shapes and (name in blocks or groups.get(name) == []):
-            what = (
-                "obstacle" if name == EVERY else f"block between {map_file.LOWEST:g} and {height:g} m above the ground"
-            )
-            raise ValueError(f"--walls: {name!r} names no {what} in the map {path}")
+        if name not in shapes and (name in outlines or groups.get(name) == []):
+            blocks = f"block between {map_file.LOWEST:g} and {height:g} m above the ground"
+            raise ValueError(f"--walls: {name!r} names no {'obstacle' if name == EVERY else blocks} in the map {path}")
     found = [each for name in names for each in ([name] if name in shapes else groups.get(name, [name]))]
     return pick(shapes, found, "walls", path)
-
-
-def _unknown(name: str, known: list[str], path: Path) -> str:
-    close = difflib.get_close_matches(name, known, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(sorted(known)) or 'none'}"
-    return f"the map {path} has no obstacle {name!r}; {hint}"
 
 
 def track(flags: Mapping[str, Any]) -> Track:
@@ -332,11 +313,9 @@ def track(flags: Mapping[str, Any]) -> Track:
     least = flags["min-distance"]
     if least is None:
         least = 0.0 if goal or gates else flags["length"]
-    if goal in walls:
-        raise ValueError(f"--goal={goal} is one of the --walls too")
-    for name in gates:
+    for parameter, name in (("goal", goal), *(("gates", gate) for gate in gates)):
         if name in walls:
-            raise ValueError(f"{name} of --gates is one of the --walls too")
+            raise ValueError(f"--{parameter}: {name} is one of the --walls too")
     if flags["min-margin"] and not walls:
         raise ValueError("--min-margin needs --walls")
     if not flags["requests"]:

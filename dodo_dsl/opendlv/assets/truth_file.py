@@ -1,7 +1,7 @@
 """True boxes from a file in the COCO format (cocodataset.org, "Data format", object detection), in pixels."""
 
 import difflib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -14,8 +14,6 @@ Frames = Literal["one", "sample-time", "number"]
 Area = tuple[float, float, float, float]
 """x, y, width and height as fractions of the image."""
 PREFIX = "color:"
-_FAR = 1.1
-"""Times the image, beyond which a box ends that is written as two corners."""
 
 Whole = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 Pixels = Annotated[float, Meta(ge=-(2**53), le=2**53)]
@@ -82,17 +80,6 @@ def read(path: Path, frames: Frames) -> dict[int, list[tuple[str, Area]]]:
     return {keys[number]: found for number, found in boxes.items()}
 
 
-def corners(path: Path) -> Iterator[InputError]:
-    """The first box that ends outside its image, as one does that is written as two corners; the file is read."""
-    truth = converted(path, load(path), Truth)
-    images = {image.id: image for image in truth.images}
-    for index, entry in enumerate(truth.annotations):
-        image, (x, y, wide, high) = images[entry.image_id], entry.bbox
-        if max((x + wide) / image.width, (y + high) / image.height) > _FAR and x < wide and y < high:
-            what = f"the box ends at {x + wide:g}, {y + high:g}, outside its image of {image.width} x {image.height}"
-            hint = f"a box is [x, y, width, height]: the one with these corners is {[x, y, wide - x, high - y]}"
-            yield InputError(path, what, f"$.annotations[{index}].bbox", hint=hint, is_slip=True)
-            return
 
 
 def no_box(name: str, labels: Collection[str]) -> str:

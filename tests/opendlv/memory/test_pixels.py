@@ -13,8 +13,8 @@ SMOOTH = cv2.resize(np.random.default_rng(3).integers(100, 156, (3, 4, 3), np.ui
 def test_a_picture_goes_through_memory(format_: str, size: int) -> None:
     assert pixels.size(format_, WIDTH, HEIGHT) == size
     memory = bytearray(size + 5)
-    pixels.view(memory, format_, WIDTH, HEIGHT)[:] = pixels.from_bgr(SMOOTH, format_)
-    back = pixels.to_bgr(pixels.view(memory, format_, WIDTH, HEIGHT), format_)
+    pixels.view(memory, format_, WIDTH, HEIGHT)[:] = pixels.converted(SMOOTH, "bgr", format_)
+    back = pixels.converted(pixels.view(memory, format_, WIDTH, HEIGHT), format_, "bgr")
     error = np.abs(back.astype(int) - SMOOTH)
     assert error.max() == 0 if format_ != "i420" else error.mean() < 3
     assert memory[size:] == bytes(5)
@@ -23,9 +23,9 @@ def test_a_picture_goes_through_memory(format_: str, size: int) -> None:
 def test_the_order_of_the_bytes() -> None:
     red = np.zeros((2, 2, 3), np.uint8)
     red[..., 2] = 255
-    assert pixels.from_bgr(red, "argb").tobytes() == b"\x00\x00\xff\xff" * 4
-    assert pixels.from_bgr(red, "rgb").tobytes() == b"\xff\x00\x00" * 4
-    assert pixels.from_bgr(red, "i420").tobytes() == bytes([82] * 4 + [90, 240])  # ITU-R BT.601
+    assert pixels.converted(red, "bgr", "argb").tobytes() == b"\x00\x00\xff\xff" * 4
+    assert pixels.converted(red, "bgr", "rgb").tobytes() == b"\xff\x00\x00" * 4
+    assert pixels.converted(red, "bgr", "i420").tobytes() == bytes([82] * 4 + [90, 240])  # ITU-R BT.601
 
 
 @pytest.mark.parametrize(

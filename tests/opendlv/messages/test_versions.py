@@ -15,7 +15,6 @@ from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9
 from dodo_dsl.opendlv.recording import Recording
 
 SETS = {version: message_versions.load(version) for version in (OLD, NEW)}
-PERCEPTION = "opendlv.logic.perception."
 WHOLE = {
     # 1.0 of March 2024
     STANDARD: [
@@ -24,7 +23,7 @@ WHOLE = {
         *(1119, *range(1130, 1137), 1171, 1172, 1173, 1180, 1181),
     ],
     # 0.9.1 to 0.9.10, without what 1.0 has in the same way
-    STANDARD_0_9: [49, 1001, 1017, 1055, 1118, *range(1128, 1137), *range(1140, 1144), 1180, 1181],
+    STANDARD_0_9: [1001, 1017, 1055, 1118, *range(1128, 1137), 1180, 1181],
 }
 
 
@@ -54,13 +53,7 @@ def test_names_and_ids_are_unique(version: str) -> None:
         (1017, floats(1, 2, 3, 4, 5, 6), {"vx": 1, "vy": 2, "vz": 3, "rollRate": 4, "pitchRate": 5, "yawRate": 6}),
         (1055, b"\x0a\x04h264\x10\x20\x18\x10\x22\x01x", {"fourcc": "h264", "width": 32, "height": 16, "data": b"x"}),
         (1118, floats(1, 0, -2), {"roll": 1, "pitch": 0, "yaw": -2}),
-        (1143, b"\x08\x05" + floats(0, 1.5)[5:], {"surfaceId": 5, "x1": 1.5}),
         (1181, b"\x08\x02\x12\x01x", {"length": 2, "data": b"x"}),
-        (
-            49,
-            floats(-90, 90) + b"\x18\x10\x22\x02ab\x28\x00",
-            {"startAzimuth": -90, "endAzimuth": 90, "distances": b"ab"},
-        ),
     ],
 )
 def test_what_only_0_9_has_is_decoded(id_: int, payload: bytes, fields: dict[str, object]) -> None:
@@ -115,7 +108,6 @@ def test_own_messages_replace_those_of_either_set(tmp_path: Path) -> None:
         messages = message_versions.load(version, own)
         assert messages.name(1140) == "team.Lap"
         assert messages.id("opendlv.sim.Frame") == 1001 and 1003 not in messages.ids()
-        assert PERCEPTION + "GroundSurface" not in messages.names()
 
 
 @pytest.mark.parametrize("name", ["cones-2020-05-15.rec", "sim-2023-04-27.rec", "track-1-2025-05-08.rec"])

@@ -193,8 +193,8 @@ def test_detections_are_fractions_of_the_picture(kept: tuple[int, ...]) -> None:
 @pytest.mark.parametrize("format_", ["argb", "bgr", "rgb"])
 @pytest.mark.parametrize("type_", [ros.IMAGE, ros.COMPRESSED])
 def test_pictures(type_: str, format_: str, encoding: str) -> None:
-    memory = pixels.from_bgr(np.random.default_rng(47).integers(0, 255, (6, 8, 3), np.uint8), format_)
-    original = pixels.to_bgr(memory, format_)
+    memory = pixels.converted(np.random.default_rng(47).integers(0, 255, (6, 8, 3), np.uint8), "bgr", format_)
+    original = pixels.converted(memory, format_, "bgr")
     picture = CameraPicture(pixels.view(memory.tobytes() + b"behind", format_, 8, 6), format_)
     wanted = topic(type_, f"video0.{format_}", encoding="png" if type_ == ros.COMPRESSED else encoding)
     TYPES.check(wanted)

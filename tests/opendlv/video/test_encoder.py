@@ -17,7 +17,7 @@ def noise(kind: str, number: int) -> pixels.Picture:
 
 def smooth(number: int) -> pixels.Picture:
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
-    return pixels.from_bgr(np.dstack([x + number, 2 * y, x + y]).astype(np.uint8), "i420")
+    return pixels.converted(np.dstack([x + number, 2 * y, x + y]).astype(np.uint8), "bgr", "i420")
 
 
 @pytest.mark.parametrize("kind", pixels.FORMATS)

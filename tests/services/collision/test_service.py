@@ -103,8 +103,8 @@ def test_frames_that_stop_are_no_verdict_about_the_application(lane: Path) -> No
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"goal": "left"}, "--goal=left is one of the --walls too"),
-        ({"gates": ["finish", "left"]}, "left of --gates is one of the --walls too"),
+        ({"goal": "left"}, "--goal: left is one of the --walls too"),
+        ({"gates": ["finish", "left"]}, "--gates: left is one of the --walls too"),
         ({"gates": ["finnish"]}, "--gates: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"),
         ({"walls": [], "min-margin": 0.1}, "--min-margin needs --walls"),
         ({"requests": []}, "--requests is empty: a drive is the application's only if it sends something"),

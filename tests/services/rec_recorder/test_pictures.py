@@ -30,7 +30,7 @@ def scene(number: int, kind: str) -> pixels.Picture:
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
     picture = np.dstack([x + y, 2 * y, 255 - x]).astype(np.uint8)
     picture[40:60, 10 * number : 10 * number + 20] = (0, 220, 250)
-    return pixels.from_bgr(picture, kind)
+    return pixels.converted(picture, "bgr", kind)
 
 
 class CameraMemory:

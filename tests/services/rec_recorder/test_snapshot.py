@@ -25,7 +25,7 @@ def taken(path: Path) -> list[int]:
     if not path.exists():
         return []
     found = cv2.imread(str(path))
-    return [n for n in range(9) if np.array_equal(found, pixels.to_bgr(scene(n, "argb"), "argb"))]
+    return [n for n in range(9) if np.array_equal(found, pixels.converted(scene(n, "argb"), "argb", "bgr"))]
 
 
 def test_the_first_picture_from_the_begin_on(camera: CameraMemory, tmp_path: Path) -> None:
