@@ -16,14 +16,12 @@ from dodo_dsl.opendlv.odvd import INTEGER_BITS
 from dodo_dsl.opendlv.protobuf_classes import Layout
 from dodo_dsl.opendlv.wire import DELIMITED, EIGHT_BYTES, FOUR_BYTES, VARINT, varint
 
-Bytes = NDArray[np.uint8]
 Words = NDArray[np.uint64]
 Numbers = NDArray[np.int64]
 Marks = NDArray[np.bool_]
 Places = tuple[Numbers, Numbers]
 """Where bytes begin and end."""
 
-WORD_BYTES = 8
 _STOP_BITS = np.uint64(0x8080808080808080)
 _VALUE_BITS = np.uint64(0x7F7F7F7F7F7F7F7F)
 _FOLDS = (
@@ -33,11 +31,6 @@ _FOLDS = (
 )
 _LENGTHS = np.uint64(0x0102030405060708)
 _ONE, _SEVEN, _TOP_BYTE = np.uint64(1), np.uint64(7), np.uint64(56)
-
-
-def fixed_words(data: bytes) -> Words:
-    """The 8 bytes that begin at each position of ``data``, as one little-endian number."""
-    return np.ndarray((max(0, len(data) - WORD_BYTES + 1),), "<u8", data, strides=(1,))
 
 
 def read_varints(source: Words, at: Numbers) -> tuple[Numbers, Numbers]:
@@ -50,12 +43,6 @@ def read_varints(source: Words, at: Numbers) -> tuple[Numbers, Numbers]:
         value = (value & kept) | ((value & moved) >> shift)
     length = ((last >> _SEVEN) * _LENGTHS) >> _TOP_BYTE
     return value.view(np.int64), length.view(np.int64)
-
-
-def signed_varints(value: Numbers) -> Numbers:
-    """The value of a zigzag number."""
-    result: Numbers = (value >> 1) ^ -(value & 1)
-    return result
 
 
 _WIRE_TYPES = {"float": FOUR_BYTES, "double": EIGHT_BYTES, "string": DELIMITED, "bytes": DELIMITED}
@@ -122,7 +109,8 @@ class Reader:
         self.usual: Marks = np.ones(len(ends), np.bool_)
         self._data, self._ends = data, ends
         self._octets = np.frombuffer(data, np.uint8)
-        self._words = fixed_words(data)
+        self._words: Words = np.ndarray((max(0, len(data) - 7),), "<u8", data, strides=(1,))
+        """The 8 bytes that begin at each position."""
 
     def message(self, layout: Layout, at: Numbers, prefix: str = "") -> Numbers:
         for field in layout.definition.fields:
@@ -151,13 +139,17 @@ class Reader:
             source: NDArray[Any] = np.ndarray((len(self._data) - size + 1,), kind, self._data, strides=(1,))
             return source[at], np.minimum(at + size, self._ends + 1)
         if type_ in ("string", "bytes"):
-            return self._places(at)
+            length, at = self._size(at)
+            self.usual &= at + length <= self._ends
+            end = np.minimum(at + length, self._ends)
+            return (at, end), end
         value, length = read_varints(self._words, at)
         bits = 1 if type_ == "bool" else INTEGER_BITS[type_]
         self.usual &= length > 0
         if bits < 64:
             self.usual &= value < 1 << bits
-        value = signed_varints(value) if type_.startswith("int") else value
+        if type_.startswith("int"):
+            value = (value >> 1) ^ -(value & 1)
         return (value.astype(object) if bits == 64 else value), np.minimum(at + length, self._ends + 1)
 
     def _size(self, at: Numbers) -> tuple[Numbers, Numbers]:
@@ -165,18 +157,10 @@ class Reader:
         self.usual &= (length > 0) & (size < _MAX_SIZE) & (at + length <= self._ends)
         return np.minimum(size, _MAX_SIZE), np.minimum(at + length, self._ends)
 
-    def _places(self, at: Numbers) -> tuple[Places, Numbers]:
-        size, at = self._size(at)
-        end = at + size
-        self.usual &= end <= self._ends
-        end = np.minimum(end, self._ends)
-        return (at, end), end
-
 
 def _cut(data: bytes, values: Any) -> Any:
-    if not isinstance(values, tuple):
-        return values
-    return [data[begin:end] for begin, end in zip(*(each.tolist() for each in values), strict=True)]
+    is_text = isinstance(values, tuple)
+    return [data[begin:end] for begin, end in np.stack(values, 1).tolist()] if is_text else values
 
 
 def _values(layout: Layout, message: Any) -> Iterator[Any]:

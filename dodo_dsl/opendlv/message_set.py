@@ -19,16 +19,6 @@ class MessageError(ValueError):
     """A message that cannot be encoded, or a payload that cannot be decoded."""
 
 
-def encode(layout: Layout, message: Message) -> bytes:
-    """Every field in the order of numbers, zeros and defaults too; raises MessageError for a number too large."""
-    if layout.narrow or layout.inner:
-        _check_ranges(message, layout)
-    data: bytes = message.SerializeToString()
-    if len(data) != layout.fixed_size:
-        data = layout.type.FromString(layout.filled + data).SerializeToString()
-    return data
-
-
 def decode(layout: Layout, payload: bytes) -> Any:
     """The message in a payload; raises MessageError.
 
@@ -60,19 +50,13 @@ def _check_decoded(message: Message, layout: Layout) -> None:
         if not isinstance(getattr(message, field), str):
             raise wire.WireError(f"'{field}' is not UTF-8 text")
     for field, type_ in layout.narrow:
-        value = getattr(message, field)
+        value, mask = getattr(message, field), 2 ** INTEGER_BITS[type_] - 1
         if value not in integer_range(type_):
-            setattr(message, field, _truncated(value, type_))
+            is_signed = type_.startswith("int")
+            setattr(message, field, wire.unzigzag(wire.zigzag(value) & mask) if is_signed else value & mask)
     for field, inner in layout.inner.items():
         if message.HasField(field):
             _check_decoded(getattr(message, field), inner)
-
-
-def _truncated(value: int, type_: str) -> int:
-    mask: int = 2 ** INTEGER_BITS[type_] - 1
-    if not type_.startswith("int"):
-        return value & mask
-    return wire.unzigzag(wire.zigzag(value) & mask)
 
 
 _RESERVED = range(2900, 3000)
@@ -90,7 +74,8 @@ class UnknownMessage(MessageError, KeyError):
 class MessageSet:
     """Messages by full name (``opendlv.proxy.GroundSteeringRequest``) and by id (1090).
 
-    Message classes are protobuf's, with the field names of the specification.
+    Message classes are protobuf's, with the field names of the specification. All that take a name, an id or a message
+    raise UnknownMessage for one that the set does not hold.
     """
 
     def __init__(self, definitions: Iterable[Definition]) -> None:
@@ -109,40 +94,32 @@ class MessageSet:
         Standard ones whose names are ``kept`` are not replaced; their ids may have two meanings. Raises OdvdError, also
         if two of the files disagree or use what is DoDo's own.
         """
-        if not paths:
-            return _standard()
         own = [each for each in merged(paths) if each.name not in kept]
-        return cls([*besides(own, shipped(), kept), *own])
+        return cls([*besides(own, shipped(), kept), *own]) if paths else _standard()
 
     def names(self) -> tuple[str, ...]:
-        """All full names, sorted."""
         return tuple(sorted(self._layouts))
 
     def type(self, key: str | int) -> builtins.type[Any]:
-        """The class of a message, by full name or id; raises UnknownMessage."""
+        """The class of a message."""
         return self.layout(key).type
 
     def id(self, key: Message | builtins.type[Message] | str) -> int:
-        """The id of a message, of its class or of its full name; raises UnknownMessage."""
+        """The id of a message, of its class or of its full name."""
         name = key if isinstance(key, str) else key.DESCRIPTOR.full_name
         return self.layout(name).definition.id
 
     def key(self, text: str) -> tuple[int, int | None]:
-        """Id and sender stamp of a name or an id as people write them, with ``/senderStamp`` or for any stamp (None).
-
-        Raises MessageError, for a name that the set does not hold UnknownMessage.
-        """
+        """Id and sender stamp of a name or an id as people write them, with ``/senderStamp`` or None for any."""
         name, slash, stamp = text.partition("/")
         if slash and not is_whole(stamp):
             raise MessageError(f"'{text}' is not a message: expected a sender stamp, a number, after the slash")
         return whole(name) if is_whole(name) else self.id(name), whole(stamp) if slash else None
 
     def ids(self) -> frozenset[int]:
-        """All ids."""
         return frozenset(self._by_id)
 
     def name(self, id_: int) -> str:
-        """The full name for an id; raises UnknownMessage."""
         return self.layout(id_).definition.name
 
     def encode(self, message: Message) -> bytes:
@@ -150,7 +127,13 @@ class MessageSet:
 
         Raises MessageError if a number does not fit its type, UnknownMessage for a message of another set.
         """
-        return encode(self.layout(message.DESCRIPTOR.full_name), message)
+        layout = self.layout(message.DESCRIPTOR.full_name)
+        if layout.narrow or layout.inner:
+            _check_ranges(message, layout)
+        data: bytes = message.SerializeToString()
+        if len(data) != layout.fixed_size:
+            data = layout.type.FromString(layout.filled + data).SerializeToString()
+        return data
 
     def decode(self, id_: int, payload: bytes) -> Any:
         """The message in a payload: fields in any order, the first of equal ones counts, absent ones default.
@@ -160,18 +143,14 @@ class MessageSet:
         return decode(self.layout(id_), payload)
 
     def layout(self, key: str | int) -> Layout:
-        """What a codec knows of a message, by full name or id; raises UnknownMessage."""
+        """What a codec knows of a message, by full name or id."""
         layout = self._by_id.get(key) if isinstance(key, int) else self._layouts.get(key)
         if layout is None:
-            raise UnknownMessage(self._unknown(key))
+            close = [name for name in self._layouts if name.rpartition(".")[2] == str(key).rpartition(".")[2]]
+            close = close or difflib.get_close_matches(str(key), self._layouts, 1)
+            hint = f": did you mean '{close[0]}'?" if close else ""
+            raise UnknownMessage(f"there is no message '{key}'{hint}")
         return layout
-
-    def _unknown(self, key: str | int) -> str:
-        if isinstance(key, int):
-            return f"there is no message with id {key}"
-        close = [name for name in self._layouts if name.rpartition(".")[2] == key.rpartition(".")[2]]
-        close = close or difflib.get_close_matches(key, self._layouts, 1)
-        return f"there is no message '{key}'" + (f": did you mean '{close[0]}'?" if close else "")
 
 
 def besides(first: Iterable[Definition], others: Iterable[Definition], kept: Container[str] = ()) -> list[Definition]:

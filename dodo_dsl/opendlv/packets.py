@@ -93,11 +93,9 @@ class Connection:
         return any(event & select.POLLHUP for _, event in self._poll.poll(0))
 
     def fileno(self) -> int:
-        """The file descriptor to poll for reading."""
         return self._socket.fileno()
 
     def close(self) -> None:
-        """Close the connection."""
         self._socket.close()
 
 
@@ -119,9 +117,9 @@ class Listener:
 
     def accept(self, timeout: float) -> tuple[str, Connection] | None:
         """A service that connects within ``timeout`` seconds, with its name; nobody can behind the last one."""
-        if not self.missing or not self._poll.poll(timeout * 1000):
+        connection = self.connection(timeout)
+        if connection is None:
             return None
-        connection = Connection(self._socket.accept()[0])
         try:
             name = (connection.receive(_NAME_S) or b"").decode("utf-8", "replace")
         except EOFError:
@@ -132,9 +130,10 @@ class Listener:
         self.named(name)
         return name, connection
 
-    def connection(self) -> Connection | None:
+    def connection(self, timeout: float = 0.0) -> Connection | None:
         """One that has been made, whose first message, the name, may not have come."""
-        return Connection(self._socket.accept()[0]) if self.missing and self._poll.poll(0) else None
+        is_there = self.missing and self._poll.poll(timeout * 1000)
+        return Connection(self._socket.accept()[0]) if is_there else None
 
     def named(self, name: str) -> None:
         """A service of this name is there; nobody can connect behind the last one."""
@@ -143,7 +142,6 @@ class Listener:
             self.close()
 
     def fileno(self) -> int:
-        """The file descriptor to poll for a service that connects."""
         return self._socket.fileno()
 
     def close(self) -> None:

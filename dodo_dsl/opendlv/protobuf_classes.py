@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.message import Message
@@ -78,10 +77,9 @@ class _Builder:
         return self.layouts[name]
 
     def _resolved(self, definition: Definition, field: Field) -> str:
-        prefix = f"{definition.package}." if definition.package else ""
-        for name in (prefix + field.type, field.type):
-            if name in self.definitions:
-                return name
+        names = f"{definition.package}.{field.type}", field.type
+        if found := next((name for name in names if name in self.definitions), ""):
+            return found
         raise OdvdError(f"{field.place}: '{field.type}' is neither a type nor a message")
 
     def _message_type(self, definition: Definition, inner: Mapping[str, Layout]) -> type[Message]:
@@ -113,8 +111,13 @@ def _field(field: Field, inner: Mapping[str, Layout]) -> "descriptor_pb2.FieldDe
 
 
 def _layout(definition: Definition, inner: Mapping[str, Layout], type_: type[Message]) -> Layout:
-    filled = _filled(type_, inner)
-    fields = definition.fields
+    fields, message = definition.fields, type_()
+    for field in message.DESCRIPTOR.fields:
+        if field.name in inner:
+            getattr(message, field.name).MergeFromString(inner[field.name].filled)
+        else:
+            setattr(message, field.name, field.default_value)
+    filled = message.SerializeToString()
     return Layout(
         type=type_,
         definition=definition,
@@ -125,14 +128,3 @@ def _layout(definition: Definition, inner: Mapping[str, Layout], type_: type[Mes
         inner=inner,
         shape={f.number: inner[f.name].shape if f.name in inner else {} for f in fields},
     )
-
-
-def _filled(type_: type[Message], inner: Mapping[str, Layout]) -> bytes:
-    message: Any = type_()
-    for field in message.DESCRIPTOR.fields:
-        if field.name in inner:
-            getattr(message, field.name).MergeFromString(inner[field.name].filled)
-        else:
-            setattr(message, field.name, field.default_value)
-    data: bytes = message.SerializeToString()
-    return data

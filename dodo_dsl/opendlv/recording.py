@@ -284,11 +284,9 @@ class Recording:
             yield from batch.envelopes()
 
     def envelope(self, row: int) -> Envelope:
-        """The envelope of one row."""
         return next(self._gathered(np.array([row])).envelopes())
 
     def close(self) -> None:
-        """Let go of the file."""
         self._stream.close()
 
     def __enter__(self) -> "Recording":

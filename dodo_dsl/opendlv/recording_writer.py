@@ -3,7 +3,6 @@
 import itertools
 from collections.abc import Iterable
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
@@ -35,15 +34,12 @@ class RecordingWriter:
             self._append(some)
 
     def close(self) -> None:
-        """End the recording."""
         self._file.close()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _append(self, frames: list[bytes]) -> None:

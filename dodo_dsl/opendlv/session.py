@@ -238,7 +238,6 @@ class Session:
             self.is_member = False
 
     def close(self) -> None:
-        """Leave the bus."""
         self._receiver.close()
         self._sender.close()
 

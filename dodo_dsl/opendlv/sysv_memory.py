@@ -109,14 +109,14 @@ class Segment:
                     os.fchmod(token, MODE)
                 status = os.fstat(token)
                 with suppress(sysv_ipc.ExistentialError):  # another creator had the same key in the same moment
-                    if twin_token(path) is None and _clear(path, status, existed):
+                    if twin_token(path) is None and _clear(status, existed):
                         objects = _made(status, size)
                         tried.remove(token)
                         return cls(path, token, *objects)
                 path.unlink(missing_ok=True)  # it is still open, so that the next one has another inode
         except (OSError, ValueError, sysv_ipc.Error) as error:
             what = getattr(error, "strerror", None) or error
-            raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: {path}: {what}") from None
+            raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: {what} ({path})") from None
         finally:
             for each in tried:
                 os.close(each)
@@ -205,7 +205,7 @@ def _made(status: os.stat_result, size: int) -> list[Any]:
     return made
 
 
-def _clear(path: Path, status: os.stat_result, existed: bool) -> bool:
+def _clear(status: os.stat_result, existed: bool) -> bool:
     """Remove what a dead creator left; False if the keys belong to a memory of another name or another user."""
     with suppress(sysv_ipc.PermissionsError):
         with suppress(sysv_ipc.ExistentialError):
@@ -215,7 +215,7 @@ def _clear(path: Path, status: os.stat_result, existed: bool) -> bool:
             if users and not existed:
                 return False
             if users and Path(f"/proc/{memory.creator_pid}").exists():  # 0 in another namespace
-                raise SharedMemoryError(f"process {memory.creator_pid} uses it ({path})")
+                raise SharedMemoryError(f"process {memory.creator_pid} uses it")
             memory.remove()
         for project in (MUTEX, CONDITION):
             with suppress(sysv_ipc.ExistentialError):

@@ -16,7 +16,6 @@ from dodo_dsl.opendlv.picture_size import MAX_PIXELS, too_large
 CODECS = {"h264": "h264", "H264": "h264", "VP80": "vp8", "VP90": "vp9", "mjpg": "mjpeg", "MJPG": "mjpeg"}
 _START = b"\x00\x00\x01"
 _IDR = 5
-_SHOWN = 40
 _AV_NAMES = {"argb": "bgra", "i420": "yuv420p", "bgr": "bgr24", "rgb": "rgb24"}
 
 
@@ -39,11 +38,8 @@ class DecodedFrame:
         self.height: int = frame.height
 
     def pixels(self, kind: str) -> NDArray[np.uint8]:
-        """The image as in OpenDLV's memory: ``argb`` (height, width, 4: B, G, R, A), ``bgr`` (height, width, 3)
-        or ``i420`` (height * 3 / 2, width: the planes Y, U, V).
-        """
-        array: NDArray[np.uint8] = self._frame.to_ndarray(format=_AV_NAMES[kind])
-        return array
+        """The image, shaped as ``pixels.view`` has it."""
+        return np.asarray(self._frame.to_ndarray(format=_AV_NAMES[kind]), np.uint8)
 
 
 class VideoDecoder:
@@ -55,9 +51,8 @@ class VideoDecoder:
 
     def __init__(self, format_: str) -> None:
         if format_ not in CODECS:
-            raise VideoError(
-                f"frames of format '{format_[:_SHOWN]}' cannot be decoded, expected one of {', '.join(CODECS)}"
-            )
+            known = ", ".join(CODECS)
+            raise VideoError(f"frames of format '{format_:.40}' cannot be decoded, expected one of {known}")
         self._av = pyav("decoded")
         self._is_h264 = CODECS[format_] == "h264"
         self._codec: Any = self._av.CodecContext.create(CODECS[format_], "r")
@@ -71,7 +66,7 @@ class VideoDecoder:
 
     def decode(self, packet: bytes) -> DecodedFrame | None:
         """The frame of a packet, or None."""
-        if not packet or not (self._begun or self._begins(packet)):
+        if not packet or not (self._begun or not self._is_h264 or has_key_frame(packet)):
             self.early += bool(packet)
             return None
         try:
@@ -80,9 +75,6 @@ class VideoDecoder:
             return None
         self._begun = self._begun or bool(frames)
         return DecodedFrame(frames[-1]) if frames else None
-
-    def _begins(self, packet: bytes) -> bool:
-        return not self._is_h264 or has_key_frame(packet)
 
 
 def has_key_frame(packet: bytes) -> bool:
@@ -138,19 +130,17 @@ class VideoEncoder:
         self._kind, self._width, self._height = kind, width, height
         self._pixels = _ENCODED_AV_NAMES[kind] if lossless else _PLANAR
         self._next = 0
-        self._codec: Any = self._av.CodecContext.create("libx264rgb" if self._is_rgb else "libx264", "w")
+        self._codec: Any = self._av.CodecContext.create("libx264" if self._pixels == _PLANAR else "libx264rgb", "w")
         self._codec.width, self._codec.height, self._codec.pix_fmt = width, height, self._pixels
         self._codec.time_base, self._codec.framerate = _MICROSECOND, Fraction(10)
         self._codec.gop_size, self._codec.max_b_frames, self._codec.thread_count = key_interval, 0, 1
-        self._codec.options = {"tune": "zerolatency", "x264-params": "scenecut=0", **_rate(quality, lossless, fast)}
+        rate = {"qp": "0"} if lossless else {"profile": "baseline", "crf": str(quality)}
+        rate["preset"] = "ultrafast" if lossless or fast else "veryfast"
+        self._codec.options = {"tune": "zerolatency", "x264-params": "scenecut=0", **rate}
         try:
             self._codec.open()
         except self._av.FFmpegError as error:
             raise VideoError(f"images of {width} x {height} pixels cannot be encoded: {error}") from None
-
-    @property
-    def _is_rgb(self) -> bool:
-        return self._pixels != _PLANAR
 
     def encode(self, picture: NDArray[np.uint8]) -> bytes:
         """The packet of an image, shaped as ``pixels.view`` has it; raises VideoError."""
@@ -169,10 +159,4 @@ class VideoEncoder:
         plane = frame.planes[0]
         rows = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)
         rows[: self._height, : picture[0].nbytes] = picture.reshape(self._height, -1)
-        return frame if self._is_rgb else frame.reformat(format=_PLANAR)
-
-
-def _rate(quality: int, lossless: bool, fast: bool) -> dict[str, str]:
-    if lossless:
-        return {"preset": "ultrafast", "qp": "0"}
-    return {"preset": "ultrafast" if fast else "veryfast", "profile": "baseline", "crf": str(quality)}
+        return frame.reformat(format=_PLANAR) if self._pixels == _PLANAR else frame

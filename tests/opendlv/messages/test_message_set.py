@@ -103,7 +103,7 @@ def test_numbers_that_do_not_fit_are_refused() -> None:
 @pytest.mark.parametrize(
     ("key", "text"),
     [
-        (1, "there is no message with id 1"),
+        (1, "there is no message '1'"),
         ("GroundSteeringRequest", "did you mean 'opendlv.proxy.GroundSteeringRequest'?"),
         ("opendlv.proxy.GroundStearingRequest", "did you mean 'opendlv.proxy.GroundSteeringRequest'?"),
         ("x", "there is no message 'x'"),
