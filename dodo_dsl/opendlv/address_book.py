@@ -30,7 +30,6 @@ def leave(folder: Path, name: str, address: Address) -> None:
 
 
 def remove(folder: Path, name: str) -> None:
-    """Removes an entry, if there is one."""
     (folder / name).unlink(missing_ok=True)
 
 
@@ -48,7 +47,6 @@ class AddressBook:
         self.present: set[Address] = set()
 
     def read(self) -> None:
-        """Reads the entries, if any has changed."""
         if self._folder is None or (changed := self._folder.stat().st_mtime_ns) == self._changed:
             return
         self._changed = changed if time.time_ns() - changed > _TICK_NS else 0

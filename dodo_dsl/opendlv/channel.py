@@ -70,15 +70,12 @@ class Channel:
 
     @classmethod
     def connect(cls, path: Path, name: str) -> Self:
-        """Connects as a service of this name, as soon as the clock listens."""
         return cls(Connection.open(path, name, math.inf))
 
     def send(self, message: Message) -> None:
-        """Sends a message; it is lost where the other end has gone."""
         self._connection.send(_encode(message))
 
     def receive(self, timeout: float) -> Message | None:
-        """The next message within ``timeout`` seconds; raises EOFError when the other end has gone."""
         data = self._connection.receive(timeout)
         message: Message | None = None if data is None else _decode(data)
         return message

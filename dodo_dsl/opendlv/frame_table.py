@@ -55,7 +55,6 @@ def read_frames(data: bytes, starts: list[int], ends: list[int], known: bool = F
 
 
 def _one_by_one(data: bytes, starts: list[int], ends: list[int], known: bool) -> list[tuple[int, ...]]:
-    """Rows up to the first frame that holds no envelope."""
     rows: list[tuple[int, ...]] = []
     for start, end in zip(starts, ends, strict=True):
         at = start + HEADER_BYTES
@@ -73,7 +72,6 @@ def _one_by_one(data: bytes, starts: list[int], ends: list[int], known: bool) ->
 
 
 def _at_once(data: bytes, starts: Numbers, ends: Numbers) -> tuple[Table, Marks]:
-    """All rows, and which of them are as libcluon writes them: every field once and in order."""
     reader = message_columns.Reader(data, ends)
     at = reader.message(LAYOUT, starts + HEADER_BYTES)
     kind, payload, *others = (values for _, _, values in reader.columns)

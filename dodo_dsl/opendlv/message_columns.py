@@ -62,7 +62,6 @@ class Column:
 
 
 def column_names(layout: Layout, prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Name and type of each column of a message."""
     for field in layout.definition.fields:
         if field.name in layout.inner:
             yield from column_names(layout.inner[field.name], f"{field.name}.")

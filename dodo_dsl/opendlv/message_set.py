@@ -84,7 +84,6 @@ class MessageSet:
 
     @classmethod
     def standard(cls) -> "MessageSet":
-        """The messages that DoDo knows by itself, built once."""
         return _standard()
 
     @classmethod
@@ -101,7 +100,6 @@ class MessageSet:
         return tuple(sorted(self._layouts))
 
     def type(self, key: str | int) -> builtins.type[Any]:
-        """The class of a message."""
         return self.layout(key).type
 
     def id(self, key: Message | builtins.type[Message] | str) -> int:
@@ -143,7 +141,6 @@ class MessageSet:
         return decode(self.layout(id_), payload)
 
     def layout(self, key: str | int) -> Layout:
-        """What a codec knows of a message, by full name or id."""
         layout = self._by_id.get(key) if isinstance(key, int) else self._layouts.get(key)
         if layout is None:
             close = [name for name in self._layouts if name.rpartition(".")[2] == str(key).rpartition(".")[2]]

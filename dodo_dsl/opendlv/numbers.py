@@ -13,12 +13,10 @@ def number(text: str) -> float:
 
 
 def exact(text: str) -> Decimal:
-    """As ``Decimal``; raises ValueError and InvalidOperation."""
     return Decimal(_plain(text))
 
 
 def whole(text: str) -> int:
-    """A whole number of at most 20 digits with or without a sign; raises ValueError."""
     if not is_whole(text[1:] if text[:1] in ("-", "+") else text):
         raise ValueError(f"'{text[:_SHOWN]}' is not a whole number")
     return int(text)

@@ -25,8 +25,6 @@ class OdvdError(ValueError):
 
 
 class TextPlace(NamedTuple):
-    """A position in a file; line and column count from 1."""
-
     file: str
     line: int
     column: int
@@ -43,7 +41,6 @@ Default = bool | int | float | str | None
 
 
 def integer_range(type_: str) -> range:
-    """The values that an integer type holds; a ``char`` is 0 to 255."""
     bits = INTEGER_BITS[type_]
     return range(-(2 ** (bits - 1)), 2 ** (bits - 1)) if type_.startswith("int") else range(2**bits)
 
@@ -81,8 +78,6 @@ class Field:
 
 @dataclass(frozen=True)
 class Definition:
-    """One message: full name, identifier, and fields in the order of the file."""
-
     name: str
     id: int
     package: str
@@ -127,7 +122,7 @@ def _form(type_: str) -> str:
 
 
 def load(path: Path) -> tuple[Definition, ...]:
-    """Read and parse one file; raises OdvdError."""
+    """The messages of a file in their order; raises OdvdError."""
     try:
         text = regular_file.text(path, MAX_FILE_BYTES)
     except OSError as error:
@@ -155,7 +150,6 @@ _END, _SPACE, _WORD = re.compile(r"\s*\}"), re.compile(r"\s*"), re.compile(r"\w+
 
 
 def parse(text: str, file: str = "<odvd>") -> tuple[Definition, ...]:
-    """The messages of a specification in their order; raises OdvdError."""
     reader, found = _Reader(text, file), list[Definition]()
     package = match[1] if (match := reader.has(_PACKAGE)) else ""
     while not reader.is_at_end():
@@ -181,7 +175,6 @@ class _Reader:
         self._file, self._at = file, 0
 
     def has(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
-        """What comes, if it is this; then it is passed."""
         match = pattern.match(self._text, self._at)
         self._at = match.end() if match else self._at
         return match
@@ -191,7 +184,6 @@ class _Reader:
         return self._at == len(self._text)
 
     def take(self, pattern: re.Pattern[str], expected: str) -> tuple[re.Match[str], TextPlace]:
-        """What comes, and where its name is; raises OdvdError."""
         self.has(_SPACE)
         if (match := self.has(pattern)) is None:
             word = _WORD.match(self._text, self._at)
@@ -204,7 +196,6 @@ class _Reader:
 
 
 def _options(type_: str, text: str, place: TextPlace) -> tuple[int, Default]:
-    """The id of a field, 0 without one, and its default."""
     number, default, at = 0, None, 0
     while text[at:].strip():
         if (match := _OPTION.match(text, at)) is None:
@@ -227,7 +218,6 @@ def _id(text: str, maximum: int, place: TextPlace) -> int:
 
 
 def _refuse_twins(entries: Iterable[tuple[TextPlace, str, int]]) -> None:
-    """Raises OdvdError where a name or an id is used a second time."""
     used: dict[str | int, TextPlace] = {}
     for place, name, id_ in entries:
         for key in (name, id_):

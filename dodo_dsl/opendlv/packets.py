@@ -58,7 +58,6 @@ class Connection:
                 return made
 
     def send(self, data: bytes) -> bool:
-        """Sends a message; whether the other end is there to take it."""
         try:
             while len(data) > PACKET:
                 self._socket.send(_MORE + data[:PACKET])
@@ -89,7 +88,6 @@ class Connection:
 
     @property
     def has_gone(self) -> bool:
-        """Whether the other end has closed the connection."""
         return any(event & select.POLLHUP for _, event in self._poll.poll(0))
 
     def fileno(self) -> int:
@@ -103,7 +101,6 @@ class Listener:
     """The end to which services connect, each of ``services`` once; others are turned away."""
 
     def __init__(self, path: Path, services: Iterable[str]) -> None:
-        """Raises OSError."""
         self._path = path
         self.missing = set(services)
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -136,7 +133,6 @@ class Listener:
         return Connection(self._socket.accept()[0]) if is_there else None
 
     def named(self, name: str) -> None:
-        """A service of this name is there; nobody can connect behind the last one."""
         self.missing.discard(name)
         if not self.missing:
             self.close()
@@ -145,7 +141,6 @@ class Listener:
         return self._socket.fileno()
 
     def close(self) -> None:
-        """Nobody else can connect."""
         self.missing.clear()
         self._socket.close()
         self._path.unlink(missing_ok=True)

@@ -62,7 +62,6 @@ class PosixSegment:
 
     @classmethod
     def create(cls, path: Path, size: int) -> Self:
-        """Make it anew; what a dead creator left is removed. Raises SharedMemoryError."""
         token = -1
         try:
             _remove_orphan(path)
@@ -82,7 +81,6 @@ class PosixSegment:
 
     @classmethod
     def attach(cls, path: Path) -> Self:
-        """Find what another process made; raises SharedMemoryError."""
         try:
             token = os.open(path, _FLAGS)
         except OSError as error:
@@ -109,15 +107,12 @@ class PosixSegment:
 
     @property
     def size(self) -> int:
-        """Bytes of the data."""
         return self._size.value
 
     def view(self) -> memoryview:
-        """A view of the data, which keeps the memory mapped."""
         return memoryview(self._memory)[HEADER_BYTES : HEADER_BYTES + self.size]
 
     def lock(self, timeout: float) -> bool:
-        """Take the mutex; False when another holds it for ``timeout`` seconds. Raises OSError if it is broken."""
         return self._taken(_libc.pthread_mutex_clocklock(self._mutex, CLOCK_MONOTONIC, _deadline(timeout)))
 
     def unlock(self) -> None:
@@ -158,7 +153,6 @@ class PosixSegment:
         return int(self._numbers[_WAITERS_AT // 4]) >> 3  # glibc counts by eights
 
     def remove(self) -> None:
-        """Take the object away where it is still the same one, and wake all that wait."""
         remove_own(self.path, self.token)
         with suppress(TimeoutError):
             self.wake()

@@ -26,8 +26,6 @@ MAX_PLACES = 1000
 
 @dataclass
 class DamagePlace:
-    """Bytes of a file that are not a frame: ``size`` of them from byte ``offset``."""
-
     offset: int
     size: int
     reason: str
@@ -98,12 +96,10 @@ class Batch:
         return Batch(self.data, self.base, self.table[:, rows])
 
     def frames(self) -> Iterator[bytes]:
-        """The frames, header included."""
         for start, end in self.table[: Fact.END + 1].T.tolist():
             yield self.data[start:end]
 
     def envelopes(self) -> Iterator[Envelope]:
-        """The envelopes in the order of the rows."""
         columns = (*self.table[Fact.DATA_TYPE : Fact.SENT_S], *self.times, self.table[Fact.SENDER_STAMP])
         for kind, at, end, sent, received, sampled, stamp in zip(*(c.tolist() for c in columns), strict=True):
             yield Envelope(kind, self.data[at:end], sent, received, sampled, stamp)
@@ -122,11 +118,9 @@ class Scanner:
 
     @property
     def position(self) -> int:
-        """How many bytes are behind."""
         return self._base + self._at
 
     def batches(self) -> Iterator[Batch]:
-        """Batches of one frame or more, in the order of the file."""
         while not self._ended:
             self._fill()
             parts = list(self._tables())
@@ -159,7 +153,6 @@ class Scanner:
                 self._at, self._burst = ends[-1], min(self._burst * 2, MAX_FRAMES)
 
     def _chain(self) -> tuple[list[int], list[int]]:
-        """Begins and ends of whole frames, one behind the other."""
         data, at, last, most = self._data, self._at, self._limit - HEADER_BYTES, self._burst
         starts: list[int] = []
         ends: list[int] = []
@@ -279,7 +272,6 @@ class Recording:
             first, behind = last, int(ends[last - 1])
 
     def envelopes(self, rows: Numbers | None = None) -> Iterator[Envelope]:
-        """The envelopes of some rows in the order given (by default all)."""
         for batch in self.batches(rows):
             yield from batch.envelopes()
 
@@ -296,7 +288,6 @@ class Recording:
         self.close()
 
     def _gathered(self, rows: Numbers) -> Batch:
-        """Read frames that lie near one another with one call."""
         order = np.argsort(self.index["offset"][rows], kind="stable")
         offsets, sizes = self.index["offset"][rows[order]], self.index["size"][rows[order]].astype(np.int64)
         cuts = np.flatnonzero(offsets[1:] - (offsets[:-1] + sizes[:-1]) > _NEAR) + 1

@@ -28,7 +28,6 @@ class RecordingWriter:
         self.write_frames((encode_frame(envelope),))
 
     def write_frames(self, frames: Iterable[bytes]) -> None:
-        """Append encoded frames, some with one write; raises OSError as ``write`` does."""
         rest = iter(frames)
         while some := list(itertools.islice(rest, _TOGETHER)):
             self._append(some)

@@ -51,5 +51,4 @@ def content(path: Path, most: int = MOST_BYTES) -> bytes:
 
 
 def text(path: Path, most: int = MOST_BYTES) -> str:
-    """The UTF-8 text of a regular file, without its BOM; raises OSError as ``content`` does, and UnicodeDecodeError."""
     return content(path, most).decode().removeprefix("\ufeff")

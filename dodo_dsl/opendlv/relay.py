@@ -43,7 +43,6 @@ class Relay:
 
 
 def serve(relay: Relay, lines: TextIO, stdout: TextIO) -> int:
-    """Sends what comes until its end."""
     print("ready", file=stdout, flush=True)
     for each in lines:
         *to, data = each.split()

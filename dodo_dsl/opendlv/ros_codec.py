@@ -73,7 +73,6 @@ class Codec:
             raise RosTypeError(f"a value does not fit {type_}: {error}") from None
 
     def decode(self, type_: str, data: bytes | memoryview) -> Fields:
-        """All fields of a message, arrays of numbers as those of numpy, without a copy; raises RosTypeError."""
         self._fields(type_)
         try:
             return dict(self._plain(self.store.deserialize_cdr(data, type_)))
@@ -81,11 +80,9 @@ class Codec:
             raise RosTypeError(f"{len(data)} bytes are no {type_}: {error}") from None
 
     def fields(self, type_: str) -> tuple[str, ...]:
-        """The names of a type's fields; raises RosTypeError."""
         return tuple(name for name, _ in self._fields(type_))
 
     def has_header(self, type_: str) -> bool:
-        """Whether a type has a stamp and a frame id."""
         return ("header", (_NAME, "std_msgs/msg/Header")) in self._fields(type_)
 
     def check_path(self, type_: str, path: str) -> None:
@@ -104,7 +101,6 @@ class Codec:
         return tuple(self.store.fielddefs[type_][1])
 
     def _built(self, desc: Any, value: Any) -> Any:
-        """A value as rosbags wants it; None is 0 or empty."""
         kind, of = desc
         if kind == _NAME:
             given = value or {}

@@ -26,8 +26,6 @@ __all__ = ["BusMessage", "CameraPicture", "RosTypeError", "Types", "messages_of"
 
 
 class BusMessage(NamedTuple):
-    """A message for the bus, its sample time in us and its sender stamp."""
-
     message: Any
     sample_time: int
     stamp: int
@@ -94,7 +92,6 @@ class Types(Codec):
         return [BusMessage(self._message(topic, name, fields), time, stamp) for name, stamp in stamps.items()]
 
     def frames(self, frames: Sequence[StaticFrame], time_us: int) -> Fields:
-        """The message of ``/tf_static``."""
         transforms = []
         for frame in frames:
             turn = zip("xyzw", quaternion(frame.roll, frame.pitch, frame.yaw), strict=True)
@@ -105,7 +102,6 @@ class Types(Codec):
         return {"transforms": transforms}
 
     def given_header(self, topic: Topic, time_us: int) -> Fields:
-        """The field ``header``, where the type has one."""
         if not self.has_header(topic.type):
             return {}
         frame_id = topic.frame_id or ros.FRAME_IDS.get(topic.type, "")
@@ -145,7 +141,6 @@ class Types(Codec):
 
 
 def stamp_of(time_us: int) -> dict[str, int]:
-    """A time in us as ROS has it."""
     seconds, rest = divmod(time_us, MICROSECONDS)
     return {"sec": seconds, "nanosec": rest * 1000}
 
@@ -157,7 +152,6 @@ def time_of(fields: Mapping[str, Any]) -> int:
 
 
 def messages_of(topic: Topic) -> Iterator[tuple[str, int]]:
-    """The names and sender stamps of a topic's messages."""
     for each in topic.bus:
         name, _, stamp = each.partition("/")
         yield name, int(stamp or 0)

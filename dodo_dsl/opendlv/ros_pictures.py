@@ -29,7 +29,6 @@ class CameraPicture(NamedTuple):
 
 
 def picture_fields(topic: Topic, picture: CameraPicture | None) -> Fields:
-    """The fields of a picture, or of what is known of its camera, without the header; raises RosTypeError."""
     if topic.type == CAMERA_INFO and topic.camera:
         return _camera_info(topic.camera)
     if picture is None:
@@ -46,7 +45,6 @@ def picture_fields(topic: Topic, picture: CameraPicture | None) -> Fields:
 
 
 def encoding_of(topic: Topic) -> str:
-    """That of a topic's pictures; raises RosTypeError for one that its type does not have."""
     known = _ENCODINGS[topic.type]
     if topic.encoding and topic.encoding not in known:
         raise RosTypeError(f"{topic.topic} has the encoding '{topic.encoding}', expected one of {', '.join(known)}")

@@ -18,7 +18,6 @@ from typing import Self
 
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv import wire
 from dodo_dsl.opendlv.address import RECEIVE_BUFFER, Address, FrameError, group, sender
 from dodo_dsl.opendlv.envelope import Envelope, decode_frame, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
@@ -29,8 +28,7 @@ _LOAD = {1: 0x30, 2: 0x28, 4: 0x20}  # BPF_LD | BPF_ABS, a byte, two or four
 _SOURCE_PORT, _SOURCE_HOST = 0, 0xFFF0_0000 + 12  # in the UDP header; behind SKF_NET_OFF, in the IP header
 _IF_EQUAL, _RETURN = 0x15, 0x06
 _ALL, _NOTHING = 0xFFFFFFFF, 0
-_UDP_HEADER, _FRAME_HEADER = 8, 5
-_TAG = _UDP_HEADER + _FRAME_HEADER
+_TAG = 8 + 5  # behind the headers of UDP and of the frame
 _FILTERED_TAG = 0x08  # the envelope's first field
 _INSTRUCTION = struct.Struct("@HBBI")
 _MOST = 4096
@@ -85,7 +83,6 @@ MAX_DATAGRAM_BYTES = 65_507
 CIDS = range(1, 255)
 MAX_DROPPED = 1000  # before a flood of garbage can end a wait
 _NO_ROUTE = (errno.ENODEV, errno.ENETUNREACH)
-_ID_PLACE, _ID_TAG = 5, 0x08  # behind the frame's header, the envelope's first field
 _IP_MULTICAST_ALL = 49  # Linux: linux/in.h
 _SO_TIMESTAMPNS = 35  # Linux: asm-generic/socket.h
 _SO_RXQ_OVFL = 40
@@ -289,14 +286,13 @@ class Session:
             self.lost = sum(self._dropped.values())
         if address == self.address:
             return None
-        if self._only is not None and self._buffer[_ID_PLACE] == _ID_TAG and _id(self._buffer) not in self._only:
-            return None
         self.source = address
         try:
-            return decode_frame(bytes(self._view[:size]), _received(ancillary))
+            envelope = decode_frame(bytes(self._view[:size]), _received(ancillary))
         except FrameError:
             self.garbage += 1
             return None
+        return envelope if self._only is None or envelope.data_type in self._only else None
 
     def _wait(self, deadline: float | None) -> bool:
         left = math.inf if deadline is None else deadline - time.monotonic()
@@ -316,14 +312,6 @@ def datagram(envelope: Envelope) -> bytes:
     return frame
 
 
-def _id(frame: bytearray) -> int:
-    """The id of the message in a frame that begins with it, 0 for damage."""
-    try:
-        return wire.unzigzag(wire.read_varint(frame, _ID_PLACE + 1)[0])
-    except wire.WireError:
-        return 0
-
-
 def _received(ancillary: list[tuple[int, int, bytes]]) -> int:
     """When the kernel took the datagram, else now; microseconds since the epoch."""
     for _, kind, data in ancillary:
@@ -334,7 +322,6 @@ def _received(ancillary: list[tuple[int, int, bytes]]) -> int:
 
 
 def _lost(ancillary: list[tuple[int, int, bytes]]) -> int:
-    """The number of datagrams that the kernel has dropped so far."""
     return max((int(_COUNT.unpack(data)[0]) for _, kind, data in ancillary if kind == _SO_RXQ_OVFL), default=0)
 
 

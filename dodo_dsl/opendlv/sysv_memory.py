@@ -32,8 +32,6 @@ class SharedMemoryError(OSError):
 
 
 class Time(ctypes.Structure):
-    """The C library's timespec."""
-
     _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
 
     @classmethod
@@ -50,7 +48,6 @@ def path_of(name: str) -> Path:
 
 
 def token_key(status: os.stat_result, project: int) -> int:
-    """The SysV key of a file for a project number, as the C library's ftok makes it."""
     return status.st_ino & 0xFFFF | (status.st_dev & 0xFF) << 16 | project << 24
 
 
@@ -98,7 +95,6 @@ class Segment:
 
     @classmethod
     def create(cls, path: Path, size: int) -> Self:
-        """Make all of it anew; raises SharedMemoryError."""
         tried: list[int] = []
         try:
             for _ in range(ATTEMPTS):
@@ -124,7 +120,6 @@ class Segment:
 
     @classmethod
     def attach(cls, path: Path) -> Self:
-        """Find what another process made; raises SharedMemoryError."""
         try:
             token = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
         except OSError as error:
@@ -144,18 +139,15 @@ class Segment:
 
     @property
     def size(self) -> int:
-        """Bytes of the data."""
         return int(self.memory.size)
 
     def lock(self, timeout: float) -> bool:
-        """Take the mutex; False when another holds it for ``timeout`` seconds. Raises OSError when it is gone."""
         return operate_semaphore(self.mutex.id, -1, timeout, _SEM_UNDO)
 
     def unlock(self) -> None:
         operate_semaphore(self.mutex.id, 1, None, _SEM_UNDO)
 
     def wait(self, timeout: float | None) -> bool:
-        """Wait for a notification; raises OSError when the creator has removed the memory."""
         return operate_semaphore(self.condition.id, 0, timeout)
 
     def wake(self) -> None:
@@ -187,14 +179,12 @@ class Segment:
 
 
 def remove_own(path: Path, token: int) -> None:
-    """Removes a file where it is still the one of a descriptor."""
     with suppress(FileNotFoundError):
         if os.path.samestat(path.stat(), os.fstat(token)):
             path.unlink()
 
 
 def _made(status: os.stat_result, size: int) -> list[Any]:
-    """Segment, mutex and condition."""
     memory, *others = (token_key(status, project) for project in (MEMORY, MUTEX, CONDITION))
     made = [sysv_ipc.SharedMemory(memory, sysv_ipc.IPC_CREX, mode=MODE, size=size, init_character=b"\0")]
     try:

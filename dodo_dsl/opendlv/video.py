@@ -24,7 +24,6 @@ class VideoError(ValueError):
 
 
 def refuse_large(width: int, height: int) -> None:
-    """Raises VideoError for frames of a size that is not decoded."""
     if problem := too_large(width, height):
         raise VideoError(f"frames cannot be decoded: {problem}")
 
@@ -65,7 +64,6 @@ class VideoDecoder:
         """Packets that came before the first key frame."""
 
     def decode(self, packet: bytes) -> DecodedFrame | None:
-        """The frame of a packet, or None."""
         if not packet or not (self._begun or not self._is_h264 or has_key_frame(packet)):
             self.early += bool(packet)
             return None
@@ -88,7 +86,6 @@ def has_key_frame(packet: bytes) -> bool:
 
 
 def pyav(purpose: str) -> Any:
-    """PyAV; raises VideoError if it cannot be loaded."""
     try:
         import av
     except ImportError as error:
@@ -143,7 +140,6 @@ class VideoEncoder:
             raise VideoError(f"images of {width} x {height} pixels cannot be encoded: {error}") from None
 
     def encode(self, picture: NDArray[np.uint8]) -> bytes:
-        """The packet of an image, shaped as ``pixels.view`` has it; raises VideoError."""
         frame = self._frame(picture)
         frame.pts = self._next * 100_000
         self._next += 1

@@ -49,15 +49,12 @@ class Given:
 
 @dataclass
 class Sent:
-    """A topic that the application publishes, and whether all do so reliably."""
-
     topic: Topic
     reader: Any
     reliable: bool = True
 
 
 def is_picture(topic: Topic) -> bool:
-    """Whether it is made of a shared memory."""
     return ros_types.GIVEN.get(topic.type) == ((ros_types.MEMORY,),)
 
 
@@ -159,7 +156,6 @@ class Bridge:
             self._findings.say(Finding(("hangs", topic.topic), text, "warning"))
 
     def _show(self, name: str) -> None:
-        """Gives the graph the pictures of a memory."""
         topics = [given for given in self._given if is_picture(given.topic) and given.topic.bus[0] == name]
         camera = next((given.topic.camera for given in topics if given.topic.camera), None)
         if camera is None:
@@ -185,7 +181,6 @@ class Bridge:
             write(self._clock, self._types.encode(CLOCK_TYPE, {"clock": stamp_of(now - now % CLOCK_STEP)}))
 
     def _hear_graph(self) -> None:
-        """Takes what the application sends, and looks at its graph."""
         looked = 0.0
         while True:
             self._graph.wait(LOOK)
@@ -219,7 +214,6 @@ class Bridge:
         return shown == self._names.keys() and len(self._seen.participants) >= max(1, len(services))
 
     def _take(self, topic: Topic, data: bytes) -> None:
-        """Sends what a message of the application becomes."""
         now = now_us()
         if len(data) > _LARGEST_ANSWER:
             text = f"{topic.topic} has messages of more than {_LARGEST_ANSWER >> 20} MB, which are not taken"

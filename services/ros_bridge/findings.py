@@ -36,7 +36,6 @@ class Finding:
 
 
 def end_of(topic: Topic, writes: bool) -> Endpoint:
-    """The test's end of a topic."""
     reliable, durable = topic.reliability in ("", "reliable"), topic.durability == "transient_local"
     return Endpoint(b"", topic.topic, topic.type, writes, reliable, durable)
 
@@ -56,7 +55,6 @@ def problems(graph: RosGraph, seen: Discovered, waited: float) -> Iterator[Findi
 
 
 def _mismatch(topic: Topic, own: Endpoint, other: Endpoint, node: str) -> Iterator[Finding]:
-    """Why two ends of a topic never meet."""
     verb, where = ("publishes", "out") if other.writes else ("listens to", "in")
     lacks = other.lacks(own) if other.writes else own.lacks(other)
     if other.type != own.type:
@@ -105,7 +103,6 @@ def frame_problem(topic: Topic, frame_id: str, expected: str) -> str:
 
 
 def stamp_problem(topic: Topic, stamp_us: int, now_us: int) -> str:
-    """Of a message's ``header.stamp``; empty for none."""
     age = (now_us - stamp_us) / 1e6
     if stamp_us == 0:
         missing = f"{topic.topic} comes without a stamp; expected that of what it answers (header.stamp)"
@@ -117,7 +114,6 @@ def stamp_problem(topic: Topic, stamp_us: int, now_us: int) -> str:
 
 
 def loss(topic: Topic, node: str, size: int, lost: int) -> str:
-    """Of pictures that do not fit into the buffer of a best-effort reader."""
     return (
         f"{lost} datagrams were lost: {node} hears {topic.topic} by best effort, and its receive buffer is smaller "
         f"than a picture ({size} bytes): 'sudo sysctl -w net.core.rmem_max={4 * size}', or subscribe reliably"

@@ -76,7 +76,6 @@ class Discovered:
             self.endpoints[endpoint.guid] = endpoint
 
     def add_nodes(self, types: Types, data: bytes) -> None:
-        """Names nodes by a message of theirs, if it is one."""
         try:
             fields = types.decode(_NODES_TYPE, data)
         except RosTypeError:
@@ -90,11 +89,9 @@ class Discovered:
                 self.names.update((bytes(gid["data"]), name) for gid in gids[:_MOST])
 
     def of(self, topic: str, writes: bool) -> list[Endpoint]:
-        """Who publishes a topic, or hears it."""
         return [each for each in self.endpoints.values() if each.topic == topic and each.writes == writes]
 
     def name(self, *ends: Endpoint) -> str:
-        """Of their nodes."""
         known = [self.names.get(e.guid) or min(self.nodes.get(e.guid[:PREFIX_BYTES], ()), default="") for e in ends]
         return listed({f"'{name}'" if name else "a program" for name in known}) or "a node"
 
@@ -138,7 +135,6 @@ class Graph:
         return reader
 
     def drop(self, reader: Any) -> None:
-        """Hears it no longer."""
         self._waits.detach(reader.condition)
         del reader.condition  # which holds its last reference
 
@@ -160,7 +156,6 @@ class Graph:
             self.seen.changes += 1
 
     def _taken(self, source: builtin.BuiltinDataReader) -> Iterator[tuple[Any, bool]]:
-        """What was discovered of others, and whether they are alive."""
         while samples := source.take(_AT_ONCE):
             for each in samples:
                 if each.key.bytes[:PREFIX_BYTES] != self._own:

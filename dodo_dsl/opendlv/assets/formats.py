@@ -34,7 +34,6 @@ def problems(name: str, path: Path, settings: Settings, ids: Ids) -> Iterator[In
 
 
 def _refuse_pointer(path: Path) -> None:
-    """Raises InputError for a file whose content is elsewhere, in Git LFS."""
     try:
         with regular_file.opened(path) as file:
             is_pointer = file.read(len(_POINTER)) == _POINTER

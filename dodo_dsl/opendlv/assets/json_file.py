@@ -25,7 +25,6 @@ _PLACED = re.compile(r"(.*?)(?: - at `\$(.*)`)?", re.DOTALL)
 
 
 def read_bytes(path: Path) -> bytes:
-    """The contents of a regular file of at most 64 MiB; raises InputError."""
     try:
         return regular_file.content(path)
     except OSError as error:

@@ -150,7 +150,6 @@ def find_map(path: Path) -> Path:
 
 
 def document_of(file: Path) -> Any:
-    """The document of a map; walls ``x1,y1,x2,y2;`` of a text file are its obstacles. Raises InputError."""
     if file.suffix != WALLS:
         return load(file)
     lines = enumerate(read_bytes(file).decode(errors="replace").splitlines(), 1)
@@ -188,7 +187,6 @@ def problems(path: Path) -> tuple[MapFile | None, list[InputError]]:
 
 
 def unread_keys(file: Path, document: object) -> Iterator[InputError]:
-    """Keys of a map that nothing reads."""
     return unread(file, document, _LISTS)
 
 
@@ -217,7 +215,6 @@ def _last_of_each_frame(models: tuple[ModelEntry, ...]) -> tuple[ModelEntry, ...
 
 
 def _entries(file: Path, document: object, key: str, kind: type[Kind], report: Report) -> tuple[Kind, ...]:
-    """The entries of a list that stand somewhere and can be read; what is wrong with the others is reported."""
     found: list[Kind] = []
     is_wanted = _stands if kind is not Obstacle else lambda _: True
     for entry in entries(file, document, key, kind, partial(_resource, file.parent.resolve()), is_wanted):
@@ -229,7 +226,6 @@ def _entries(file: Path, document: object, key: str, kind: type[Kind], report: R
 
 
 def _stands(entry: object) -> bool:
-    """Not so what is nowhere, whose files need not be there."""
     return not isinstance(entry, dict) or any(entry.get(key, []) != [] for key in ("instances", "frames"))
 
 
@@ -238,7 +234,6 @@ def _raised(error: InputError) -> None:
 
 
 def _resource(folder: Path, _kind: type, name: object) -> Path:
-    """The file that a map names; ValueError when it is not there or outside the map's folder."""
     try:
         path = (folder / str(name)).resolve()
         is_file = path.is_file()
@@ -308,12 +303,10 @@ def _with_list(obstacle: Any) -> Any:
 
 
 def numbered(number: int) -> str:
-    """What an obstacle without a name is called, the map's first being number 1."""
     return f"obstacle-{number}"
 
 
 def read_footprints(path: Path, height: float) -> dict[str, list[Outline]]:
-    """As ``footprints``, of the map in a folder or of a ``map.json``; raises InputError."""
     file = find_map(path)
     return footprints(_entries(file, document_of(file), "block", BlockEntry, _raised), height)
 

@@ -73,7 +73,6 @@ def read(path: Path) -> Mesh:
 
 @functools.lru_cache(maxsize=4)
 def _mesh(data: bytes) -> Mesh:
-    """Raises _Wrong."""
     if len(data) > MAX_BYTES:
         raise _Wrong(0, f"the OBJ file has {len(data)} bytes, expected at most {MAX_BYTES}")
     mesh = _parsed(data)
@@ -110,7 +109,6 @@ def _lines(data: bytes) -> Iterator[tuple[int, list[bytes]]]:
 
 
 def _parsed(data: bytes) -> Mesh:
-    """Raises _Wrong."""
     mesh, material, faces = Mesh(), b"", list[tuple[int, list[bytes], bytes, int, int]]()
     for number, words in _lines(data):
         if words[0] == b"v":
@@ -205,7 +203,6 @@ def _name(name: bytes) -> str:
 
 
 def _inside(folder: Path, file: Path, line: int, name: bytes) -> Path:
-    """The file that another file names relative to itself."""
     found = Path(os.path.realpath(file.parent / _name(name)))  # which takes links that never end, too
     if not found.is_relative_to(folder.resolve()):
         hint = "copy it there: the map's folder goes with the test"

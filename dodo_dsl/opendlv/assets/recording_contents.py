@@ -33,7 +33,6 @@ class Contents:
     damage: str
 
     def senders(self, message: int) -> list[int]:
-        """The senders of a message, in order."""
         return sorted(sender for id_, sender in self.counts if id_ == message)
 
 

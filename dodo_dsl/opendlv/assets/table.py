@@ -17,8 +17,6 @@ _LATEST = 2**52
 
 
 class Row(NamedTuple):
-    """A line from 1, its text, and its cells."""
-
     line: int
     text: str
     cells: list[str]
@@ -31,7 +29,6 @@ class Table:
     """
 
     def __init__(self, path: Path) -> None:
-        """Raises InputError."""
         self.path = path
         rows = list(self._read())
         if not rows:
@@ -52,7 +49,6 @@ class Table:
         """Microseconds of each row."""
 
     def numbers(self, name: str) -> list[float]:
-        """The finite numbers in a column; raises InputError."""
         at, found = self.names.index(name), list[float]()
         if self.names.count(name) > 1:
             self.fail(self._header, at, f"the column '{name}' appears twice")
@@ -64,11 +60,9 @@ class Table:
         return found
 
     def lacks(self, expected: str) -> NoReturn:
-        """Raises InputError for a header without what was expected."""
         self.fail(self._header, 0, f"expected a header with {expected}, found {', '.join(self.names)}")
 
     def fail(self, row: Row, column: int, what: str, hint: str = "") -> NoReturn:
-        """Raises InputError for a cell, which begins behind so many commas."""
         before = row.text.split(",")[:column]
         raise InputError(self.path, what, line=row.line, column=sum(len(each) + 1 for each in before) + 1, hint=hint)
 

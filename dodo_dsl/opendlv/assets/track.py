@@ -41,7 +41,6 @@ def outline(pose: VehiclePose, box: VehicleBox) -> shapely.Polygon:
 
 
 def corners(pose: VehiclePose, box: VehicleBox) -> list[tuple[float, float]]:
-    """The four corners, counter-clockwise from the front left."""
     cos, sin = math.cos(pose.heading), math.sin(pose.heading)
     along, across = box.length / 2, box.width / 2
     signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
@@ -64,7 +63,6 @@ def swept(start: VehiclePose, end: VehiclePose, box: VehicleBox) -> shapely.Geom
 
 
 def between(start: VehiclePose, end: VehiclePose, share: float) -> VehiclePose:
-    """The pose after a share of the path from one pose to the next, turned the shorter way round."""
     change = math.remainder(end.heading - start.heading, math.tau)
     x, y = start.x + share * (end.x - start.x), start.y + share * (end.y - start.y)
     return VehiclePose(x, y, start.heading + share * change)
@@ -199,7 +197,6 @@ class Goal:
             self._sides = course if any(map(any, course)) else self._sides
 
     def _reached(self, ground: shapely.Geometry, place: shapely.Point) -> list[tuple[bool, bool]]:
-        """Whether the left and the right side of each line can be reached from a place."""
         lines = [shapely.LineString(line) for line in self._lines]
         part = _part_at(shapely.difference(ground, shapely.union_all(lines).buffer(THIN)), place)
         left, right = (shapely.intersects(part, shapely.offset_curve(lines, 3 * f * THIN)).tolist() for f in (1, -1))
@@ -222,7 +219,6 @@ class Goal:
 
 
 def touched(obstacles: Obstacles, area: shapely.Geometry) -> str | None:
-    """The first obstacle that an area touches."""
     return next((name for name, lines in obstacles.items() if shapely.intersects(lines, area)), None)
 
 
@@ -237,7 +233,6 @@ def length_through(area: shapely.Geometry, lines: Sequence[shapely.Geometry]) ->
 
 
 def fault_of_start(track: Track, pose: VehiclePose, box: VehicleBox) -> str | None:
-    """What is wrong with a test whose vehicle starts at a pose; None if nothing."""
     ends, area, least = {} if track.gates else track.goal, outline(pose, box), track.min_margin  # laps may end there
     for kind, obstacles in (("wall", track.walls), ("goal", ends)):
         if name := touched(obstacles, area):
@@ -260,7 +255,6 @@ def told(value: float, limit: float) -> str:
 
 
 def place(pose: VehiclePose) -> str:
-    """The vehicle's position for sentences."""
     return f"at x = {pose.x:z.2f} m, y = {pose.y:z.2f} m"
 
 

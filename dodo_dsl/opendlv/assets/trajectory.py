@@ -156,7 +156,6 @@ def read_table(path: Path, height: float) -> list[PathPoint]:
 
 
 def read_points(texts: Iterable[str], height: float) -> list[PathPoint]:
-    """Way points written as ``x y``, in m, at ``height``; raises TrajectoryError."""
     return [_written(text, height) for text in texts]
 
 

@@ -20,8 +20,6 @@ Pixels = Annotated[float, Meta(ge=-(2**53), le=2**53)]
 
 
 class Picture(Struct, frozen=True):
-    """An image, its size in pixels and, of a recording, its sample time (us)."""
-
     id: Whole
     width: Annotated[int, Meta(ge=1, lt=2**31)]
     height: Annotated[int, Meta(ge=1, lt=2**31)]
@@ -29,8 +27,6 @@ class Picture(Struct, frozen=True):
 
 
 class Category(Struct, frozen=True):
-    """A class."""
-
     id: Whole
     name: Annotated[str, Meta(pattern=r"^(?!\s*(color:)?\s*$)")]
 
@@ -90,7 +86,6 @@ def no_box(name: str, labels: Collection[str]) -> str:
 
 
 def categories(path: Path) -> list[str]:
-    """The classes that a file names, whether a box has them or not; raises InputError."""
     return [plain(entry.name) for entry in converted(path, load(path), Truth).categories]
 
 
@@ -105,7 +100,6 @@ def _by_id(path: Path, key: str, entries: list[Entry]) -> dict[int, Entry]:
 
 
 def _keys(images: Mapping[int, Picture], frames: Frames, path: Path) -> dict[int, int]:
-    """Each image's key, by its id."""
     if frames == "number":
         return {number: number for number in images}
     if frames == "sample-time":
@@ -121,7 +115,6 @@ def _keys(images: Mapping[int, Picture], frames: Frames, path: Path) -> dict[int
 
 
 def _box(path: Path, entry: Annotation, image: Picture, place: str) -> Area:
-    """The box as fractions of its image."""
     (x, y, wide, high), problem = entry.bbox, ""
     if entry.iscrowd:
         problem = "iscrowd is set, expected the box of one object"
