@@ -1,7 +1,6 @@
 """Numbers from text as people and protocols write them: not as Python alone does, such as ``1_0`` or ``١``."""
 
 import re
-from decimal import Decimal
 
 _WHOLE = re.compile(r"[0-9]{1,20}")
 _SHOWN = 40
@@ -9,11 +8,9 @@ _SHOWN = 40
 
 def number(text: str) -> float:
     """As ``float``, which may be infinite and no number; raises ValueError."""
-    return float(_plain(text))
-
-
-def exact(text: str) -> Decimal:
-    return Decimal(_plain(text))
+    if "_" in text or not text.isascii():
+        raise ValueError(f"'{text[:_SHOWN]}' is not a number")
+    return float(text)
 
 
 def whole(text: str) -> int:
@@ -25,9 +22,3 @@ def whole(text: str) -> int:
 def is_whole(text: str) -> bool:
     """Whether a text is nothing but digits, at most 20 of them."""
     return bool(_WHOLE.fullmatch(text))
-
-
-def _plain(text: str) -> str:
-    if "_" in text or not text.isascii():
-        raise ValueError(f"'{text[:_SHOWN]}' is not a number")
-    return text

@@ -32,7 +32,6 @@ START_PATIENCE = 5.0
 """Seconds for which the first picture and the first time wait for nodes that are to hear them."""
 CLOCK_STEP = 10_000
 LOOK = 1.0
-_LARGEST_ANSWER = 1 << 20
 
 
 @dataclass
@@ -215,10 +214,6 @@ class Bridge:
 
     def _take(self, topic: Topic, data: bytes) -> None:
         now = now_us()
-        if len(data) > _LARGEST_ANSWER:
-            text = f"{topic.topic} has messages of more than {_LARGEST_ANSWER >> 20} MB, which are not taken"
-            self._findings.say_later("large", topic, text)
-            return
         try:
             fields = self._types.decode(topic.type, data)
             if self._types.has_header(topic.type):

@@ -32,8 +32,12 @@ _CONFIGURATION = """<CycloneDDS><Domain>
 <Compatibility><IgnoreTypeInformation>1.15</IgnoreTypeInformation></Compatibility>
 </Domain></CycloneDDS>"""
 _NODES, _NODES_TYPE = "ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo"
-_KINDS = "Participant", "Publication", "Subscription"
 _ANY = 0x7F  # samples, whatever their state
+_DISCOVERED = (
+    builtin.BuiltinTopicDcpsParticipant,
+    builtin.BuiltinTopicDcpsPublication,
+    builtin.BuiltinTopicDcpsSubscription,
+)
 _AT_ONCE, _MOST = 100, 10_000
 PREFIX_BYTES = 12  # of a GUID: the participant's
 
@@ -112,8 +116,7 @@ class Graph:
             self._domain = Domain(domain, _CONFIGURATION)
             self._participant = DomainParticipant(domain)
             self._waits = WaitSet(self._participant)
-            kinds = (getattr(builtin, f"BuiltinTopicDcps{name}") for name in _KINDS)
-            self._discovery = [builtin.BuiltinDataReader(self._participant, kind) for kind in kinds]
+            self._discovery = [builtin.BuiltinDataReader(self._participant, kind) for kind in _DISCOVERED]
             for each in self._discovery:
                 self._waits.attach(ReadCondition(each, _ANY))
         except DDSException as error:
@@ -145,8 +148,9 @@ class Graph:
             for each, is_alive in self._taken(source):
                 key = each.key.bytes
                 if number == 0:
-                    (self.seen.participants if is_alive else self.seen.left).add(key[:PREFIX_BYTES])
-                    (self.seen.left if is_alive else self.seen.participants).discard(key[:PREFIX_BYTES])
+                    new, old = (self.seen.participants, self.seen.left)[:: 1 if is_alive else -1]
+                    new.add(key[:PREFIX_BYTES])
+                    old.discard(key[:PREFIX_BYTES])
                 elif is_alive:
                     self.seen.add(_endpoint(each, writes=number == 1))
                 else:

@@ -23,10 +23,6 @@ Vertex = tuple[float, float, float]
 Triangle = tuple[int, int, int]
 
 
-class _Wrong(Exception):
-    """Carries the line from 1, 0 for the whole file, and what is wrong."""
-
-
 class Face(NamedTuple):
     """A polygon: its vertices and texture coordinates by their numbers from 0, and its material.
 
@@ -64,22 +60,18 @@ class Mesh:
 
 def read(path: Path) -> Mesh:
     """An OBJ file; raises InputError for one that is not a mesh, or has more than a mesh may have."""
-    try:
-        return _mesh(read_bytes(path))
-    except _Wrong as wrong:
-        line, what = wrong.args
-        raise InputError(path, what, line=line) from None
+    return _mesh(path, read_bytes(path))
 
 
 @functools.lru_cache(maxsize=4)
-def _mesh(data: bytes) -> Mesh:
+def _mesh(path: Path, data: bytes) -> Mesh:
     if len(data) > MAX_BYTES:
-        raise _Wrong(0, f"the OBJ file has {len(data)} bytes, expected at most {MAX_BYTES}")
-    mesh = _parsed(data)
+        raise InputError(path, f"the OBJ file has {len(data)} bytes, expected at most {MAX_BYTES}")
+    mesh = _parsed(path, data)
     if not mesh.faces:
-        raise _Wrong(0, "the OBJ file has no faces, lines that begin with f")
+        raise InputError(path, "the OBJ file has no faces, lines that begin with f")
     if (count := sum(len(face.corners) - 2 for face in mesh.faces)) > MAX_TRIANGLES:
-        raise _Wrong(0, f"{count} triangles, expected at most {MAX_TRIANGLES}: save a simpler mesh")
+        raise InputError(path, f"{count} triangles, expected at most {MAX_TRIANGLES}: save a simpler mesh")
     return mesh
 
 
@@ -95,10 +87,8 @@ def outline(path: Path) -> list[tuple[float, float]]:
 
 def _lines(data: bytes) -> Iterator[tuple[int, list[bytes]]]:
     """The words of each line that has some, with its number from 1; after a backslash a line goes on."""
-    start, words = 0, list[bytes]()
-    for number, line in enumerate(
-        data.removeprefix(_BOM).replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n"), 1
-    ):
+    start, words, plain = 0, list[bytes](), data.removeprefix(_BOM).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    for number, line in enumerate(plain.split(b"\n"), 1):
         is_open = line.endswith(_CONTINUED)
         start, words = start or number, words + line.removesuffix(_CONTINUED).split()
         if words and not is_open:
@@ -108,11 +98,11 @@ def _lines(data: bytes) -> Iterator[tuple[int, list[bytes]]]:
         yield start, words
 
 
-def _parsed(data: bytes) -> Mesh:
+def _parsed(path: Path, data: bytes) -> Mesh:
     mesh, material, faces = Mesh(), b"", list[tuple[int, list[bytes], bytes, int, int]]()
     for number, words in _lines(data):
         if words[0] == b"v":
-            mesh.vertices.append(_vertex(number, words))
+            mesh.vertices.append(_vertex(path, number, words))
         elif words[0] == b"vt":
             mesh.spots.append(words[1:3])
         elif words[0] == b"f":
@@ -123,23 +113,24 @@ def _parsed(data: bytes) -> Mesh:
             mesh.libraries.append((number, b" ".join(words[1:])))
         for count, most, what in ((len(faces), MAX_TRIANGLES, "faces"), (len(mesh.vertices), MAX_VERTICES, "vertices")):
             if count > most:
-                raise _Wrong(number, f"more than {most} {what}: save a simpler mesh")
+                raise InputError(path, f"more than {most} {what}: save a simpler mesh", line=number)
     for number, words, material, *before in faces:
-        mesh.faces.append(_face(number, words, material, mesh, before))
+        mesh.faces.append(_face(path, number, words, material, mesh, before))
     return mesh
 
 
-def _vertex(number: int, words: Sequence[bytes]) -> Vertex:
+def _vertex(path: Path, number: int, words: Sequence[bytes]) -> Vertex:
     try:
         x, y, z = (float(word) for word in words[1:4])
     except ValueError:
         x = y = z = math.nan
     if not all(abs(part) <= FARTHEST for part in (x, y, z)):
-        raise _Wrong(number, f"'{_text(words)}' is no vertex, expected as 'v 0.1 0.2 0.3' numbers in m, below 100 km")
+        what = f"'{_text(words)}' is no vertex, expected as 'v 0.1 0.2 0.3' numbers in m, below 100 km"
+        raise InputError(path, what, line=number)
     return x, y, z
 
 
-def _face(number: int, words: Sequence[bytes], material: bytes, mesh: Mesh, before: Sequence[int]) -> Face:
+def _face(path: Path, number: int, words: Sequence[bytes], material: bytes, mesh: Mesh, before: Sequence[int]) -> Face:
     """Vertices and texture coordinates count from 1, or backwards from those ``before`` the face, from -1."""
     ends = next((at for at, word in enumerate(words) if word.startswith(b"#")), len(words))
     try:
@@ -151,8 +142,8 @@ def _face(number: int, words: Sequence[bytes], material: bytes, mesh: Mesh, befo
     numbers = zip((corners, spots), before, strict=True)
     corners, spots = ([n + so_far if n < 0 else n - 1 for n in each] for each, so_far in numbers)
     if len(corners) < 3 or not all(0 <= each < len(mesh.vertices) for each in corners):
-        what = f"'{_text(words)}' is no face, expected as 'f 1 2 3' the numbers of three or more of its "
-        raise _Wrong(number, f"{what}{len(mesh.vertices)} vertices")
+        known = f"of three or more of its {len(mesh.vertices)} vertices"
+        raise InputError(path, f"'{_text(words)}' is no face, expected as 'f 1 2 3' the numbers {known}", line=number)
     return Face(number, corners, [each for each in spots if each >= 0], material)
 
 

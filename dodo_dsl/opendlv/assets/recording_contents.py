@@ -70,13 +70,11 @@ def _contents(path: Path, _changed_ns: int) -> Contents:
 def _picture(recording: "Recording") -> tuple[int, int]:
     from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 
-    for row in recording.rows([IMAGE])[:1].tolist():
-        try:
-            image = MessageSet.standard().decode(IMAGE, recording.envelope(row).payload)
-        except MessageError:
-            break
-        return image.width, image.height
-    return 0, 0
+    try:
+        image = MessageSet.standard().decode(IMAGE, recording.envelope(int(recording.rows([IMAGE])[0])).payload)
+    except (IndexError, MessageError):
+        return 0, 0
+    return image.width, image.height
 
 
 def picture_size(path: Path) -> tuple[int, int]:
@@ -98,20 +96,14 @@ def problems(path: Path, message: int, sender: int, name: str, is_needed: bool) 
         yield InputError(path, f"cannot be read as a recording: {error.strerror}")
         return
     if not found.counts:
-        what = "the recording is empty: there is nothing to play"
-        bytes_ = f"not a recording: its {found.size} bytes hold no message"
-        yield InputError(path, bytes_ if found.size else what, hint=_HINT)
+        yield InputError(path, f"not a recording to play: its {found.size} bytes hold no message", hint=_HINT)
         return
-    cut = "'dodo rec cut' writes a part without it"
+    cut, senders = "'dodo rec cut' writes a part without it", found.senders(message)
     if found.damage:
-        yield InputError(
-            path, f"the recording has damage, which is passed over: {found.damage}", hint=cut, is_slip=True
-        )
+        what = f"the recording has damage, which is passed over: {found.damage}"
+        yield InputError(path, what, hint=cut, is_slip=True)
     if found.fault:
         yield InputError(path, f"the recording cannot be played: {found.fault}", hint=cut)
-    senders = found.senders(message)
     if found.size <= MOST_BYTES and sender not in senders and (senders or is_needed):
-        but = f", but of {', '.join(map(str, senders))}" if senders else ""
-        yield InputError(
-            path, f"the recording has no {name} of sender {sender}{but}", hint="'dodo rec info' shows them"
-        )
+        what = f"the recording has no {name} of sender {sender}, but of {', '.join(map(str, senders)) or 'none'}"
+        yield InputError(path, what, hint="'dodo rec info' shows them")
