@@ -15,7 +15,6 @@ MOST_BACK = 1_000_000
 """Microseconds that a message may lie before the one before it of the same sender; images must be in order."""
 TOOLS = range(1, 13)
 """Ids of messages of players and recorders, whose times are those of the tool."""
-_SECONDS = ((365.25 * 86_400, "years"), (86_400, "days"), (60, "minutes"), (0, ""))
 
 
 def together(times: Numbers) -> Marks:
@@ -96,8 +95,8 @@ def _disorder(recording: Recording, rows: Numbers) -> str:
     back = np.flatnonzero(np.diff(times) < -least)
     if not len(back):
         return repeated(recording, rows)
-    size = span(float(times[back[0]] - times[back[0] + 1]) / 1e6)
-    return f"{place(recording, int(rows[back[0] + 1]))} goes back in time, by {size}"
+    size = float(times[back[0]] - times[back[0] + 1]) / 1e6
+    return f"{place(recording, int(rows[back[0] + 1]))} goes back in time, by {size:,.6g} s"
 
 
 def streams(index: NDArray[np.void], rows: Numbers) -> Iterator[Numbers]:
@@ -106,12 +105,6 @@ def streams(index: NDArray[np.void], rows: Numbers) -> Iterator[Numbers]:
     order = np.argsort(keys, kind="stable")
     cuts = np.flatnonzero(np.diff(keys[order])) + 1
     yield from (rows[part] for part in np.split(order, cuts) if len(part))
-
-
-def span(seconds: float) -> str:
-    """A duration in a unit that suits it."""
-    size, unit = next((size, unit) for size, unit in _SECONDS if seconds >= 2 * size)
-    return f"{seconds / size:,.0f} {unit}" if size else f"{seconds:.6g} s"
 
 
 def place(recording: Recording, row: int) -> str:

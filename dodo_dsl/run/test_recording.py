@@ -117,8 +117,8 @@ def _arrivals_fault(recording: Recording, end: Envelope | None) -> str:
     rows = np.flatnonzero(received)
     times = received[rows]
     for at in np.flatnonzero(np.diff(times) < -recording_times.MOST_BACK).tolist():
-        back = recording_times.span(float(times[at] - times[at + 1]) / 1e6)
-        return f"{recording_times.place(recording, int(rows[at + 1]))} goes back in time, by {back}"
+        back = float(times[at] - times[at + 1]) / 1e6
+        return f"{recording_times.place(recording, int(rows[at + 1]))} goes back in time, by {back:,.6g} s"
     over = rows[times > end.sample_time + _AROUND] if end else rows[1:][np.diff(times) > recording_times.DAY]
     if len(over):
         return f"{recording_times.place(recording, int(over[0]))} was received after the end of the recording"

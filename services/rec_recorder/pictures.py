@@ -157,7 +157,7 @@ class Snapshot:
         self._is_taken = True
         try:
             layout = self._source.spec.layout(len(taken[0]))
-            picture = pixels.to_bgr(pixels.view(taken[0], *layout), layout[0])
+            picture = pixels.converted(pixels.view(taken[0], *layout), layout[0], "bgr")
             with self._path.open("xb") as file:
                 file.write(png(picture))
         except (ValueError, OSError) as error:

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.assets import map_file, mesh_text
 from dodo_dsl.opendlv.assets.json_file import read_bytes
@@ -21,26 +20,14 @@ Ids = Mapping[str, int]
 
 RECORDING = ".rec"
 PICTURES = (".png", ".jpg", ".jpeg")
-_POINTER = b"version https://git-lfs"
 
 
 def problems(name: str, path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
     """What is wrong with a file of a format; nothing where the services of DoDo do not read it."""
     try:
-        _refuse_pointer(map_file.find_map(path))
         yield from FORMATS[name].problems(path, settings, ids)
     except InputError as error:
         yield error
-
-
-def _refuse_pointer(path: Path) -> None:
-    try:
-        with regular_file.opened(path) as file:
-            is_pointer = file.read(len(_POINTER)) == _POINTER
-    except OSError:
-        return
-    if is_pointer:
-        raise InputError(path, "a Git LFS pointer, not the file", hint="run 'git lfs pull' there")
 
 
 def _map(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
@@ -52,7 +39,6 @@ def _map(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
     paints += [overlay.texture_file for overlay in read.overlays]
     for file, is_plain in dict.fromkeys((model.file, model.paint is None) for model in read.models):
         try:
-            _refuse_pointer(file)
             mesh = mesh_text.read(file)
             paints += [p for p, _ in mesh_text.paints(file, mesh, read.path.parent)] if is_plain else ()
         except InputError as error:
@@ -65,7 +51,6 @@ def _map(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
 
 
 def _refuse_bad_picture(file: Path) -> None:
-    _refuse_pointer(file)
     if problem := problem_of(read_bytes(file)):
         raise InputError(file, problem, hint="save the image again as PNG or JPEG")
 

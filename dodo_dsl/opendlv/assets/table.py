@@ -37,8 +37,6 @@ class Table:
         self.names = self._header.cells
         if len(self.names) == 1 and ";" in self._header.text:
             self.fail(self._header, 0, "semicolons between the columns, expected commas, and decimals with a point")
-        if all(_number(cell) is not None for cell in self.names):
-            self.fail(self._header, 0, "the table has no header, expected one such as 'time,x,y'")
         if len(self.rows) < 2:
             self.fail(rows[-1], 0, f"expected at least 2 rows below the header, found {len(self.rows)}")
         for row in self.rows:

@@ -57,7 +57,7 @@ def test_targets(tmp_path: Path, text: str) -> None:
     [
         ("", ": the table is empty"),
         ("time,y,x\n", ":1:1: expected at least 2 rows below the header, found 0"),
-        ("0,1,2\n1,1,2\n", ":1:1: the table has no header"),
+        ("0,1,2\n1,1,2\n2,1,2\n", ":1:1: expected a header with"),
         ("time;x;y\n0;0;0\n1;1;1\n", ":1:1: semicolons between the columns"),
         ("tim,z,t\n0,1,2\n1,1,2\n", ":1:1: "),
         ("time,x,y,x\n0,0,0,0\n1,0,0,0\n", ":1:6: the column 'x' appears twice"),

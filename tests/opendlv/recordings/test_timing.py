@@ -60,10 +60,3 @@ def test_times_of_tools_lie_within_those_of_the_others(tmp_path: Path) -> None:
     with Recording(path) as recording:
         times = recording_times.within(recording, np.arange(len(recording)))
     assert (times.min(), times.max()) == (T0, T0 + 19 * S)
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"), [(0.25, "0.25 s"), (119, "119 s"), (7200, "120 minutes"), (2e5, "2 days"), (1.7e9, "54 years")]
-)
-def test_durations_are_told_in_a_unit_that_suits(seconds: float, text: str) -> None:
-    assert recording_times.span(seconds) == text
