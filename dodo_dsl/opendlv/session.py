@@ -24,8 +24,7 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.wire import varint, zigzag
 
 _SO_ATTACH_FILTER = 26  # Linux: asm-generic/socket.h
-_LOAD = {1: 0x30, 2: 0x28, 4: 0x20}  # BPF_LD | BPF_ABS, a byte, two or four
-_SOURCE_PORT, _SOURCE_HOST = 0, 0xFFF0_0000 + 12  # in the UDP header; behind SKF_NET_OFF, in the IP header
+_LOAD = {1: 0x30, 2: 0x28}  # BPF_LD | BPF_ABS, a byte or two
 _IF_EQUAL, _RETURN = 0x15, 0x06
 _ALL, _NOTHING = 0xFFFFFFFF, 0
 _TAG = 8 + 5  # behind the headers of UDP and of the frame
@@ -36,15 +35,12 @@ _MOST = 4096
 Instruction = tuple[int, int, int, int]
 
 
-def attach_filter(
-    receiver: socket.socket, ids: Iterable[int], of_others: Iterable[int] = (), than: Iterable[Address] = ()
-) -> None:
+def attach_filter(receiver: socket.socket, ids: Iterable[int]) -> None:
     """Passes only messages with these ids, and datagrams that do not begin with an id, where the kernel can.
 
-    Messages with ids ``of_others`` pass unless they come from addresses in ``than``. Dropped datagrams count as lost in
-    the kernel's counter of the socket.
+    Dropped datagrams count as lost in the kernel's counter of the socket.
     """
-    program = [*_program(ids, of_others, than)]
+    program = [*_program(ids)]
     if len(program) > _MOST:
         return
     code = ctypes.create_string_buffer(b"".join(_INSTRUCTION.pack(*each) for each in program))
@@ -53,19 +49,11 @@ def attach_filter(
         receiver.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, filter_)
 
 
-def _program(ids: Iterable[int], of_others: Iterable[int], than: Iterable[Address]) -> Iterator[Instruction]:
+def _program(ids: Iterable[int]) -> Iterator[Instruction]:
     yield _LOAD[1], 0, 0, _TAG
     yield _IF_EQUAL, 1, 0, _FILTERED_TAG
     yield _RETURN, 0, 0, _ALL
     for id_ in sorted(ids):
-        yield from _passing(varint(zigzag(id_)))
-    for host, port in sorted(than):
-        yield _LOAD[2], 0, 0, _SOURCE_PORT
-        yield _IF_EQUAL, 0, 3, port
-        yield _LOAD[4], 0, 0, _SOURCE_HOST
-        yield _IF_EQUAL, 0, 1, int.from_bytes(socket.inet_aton(host), "big")
-        yield _RETURN, 0, 0, _NOTHING
-    for id_ in sorted(of_others):
         yield from _passing(varint(zigzag(id_)))
     yield _RETURN, 0, 0, _NOTHING
 
@@ -202,17 +190,13 @@ class Session:
         """As ``fileno``, with that of its own address if it ``hears_directly``."""
         return [each.fileno() for each in self._sources()]
 
-    def hear_only(
-        self, ids: Iterable[int], of_others: Iterable[int] = (), than: Iterable[Address] = frozenset()
-    ) -> None:
+    def hear_only(self, ids: Iterable[int]) -> None:
         """Receive messages with ``ids`` from now on; where the kernel can, this process is not woken for others.
 
-        Those ``of_others`` come only from other addresses ``than`` these.
         Losses are not counted any more, as the kernel counts the others with them.
         """
-        passing, of_others, than = frozenset(ids), frozenset(of_others), frozenset(than)
-        self._only = passing | of_others
-        attach_filter(self._receiver, passing, of_others, than)
+        self._only = frozenset(ids)
+        attach_filter(self._receiver, self._only)
 
     def hear_directly(self, hears: bool = True) -> None:
         """Receive also what others send to this session's own ``address``, or no longer."""

@@ -101,10 +101,6 @@ class Exchange:
         self._senders.book.read()
         return self._senders.book.addresses.get(RUNNER)
 
-    def ignore_services(self, ids: Iterable[int]) -> None:
-        """Not be woken by messages with these ids that services send on the bus: all of them are known now."""
-        self._session.hear_only((), ids, self._own)
-
     def close(self) -> None:
         self._listener.close()
         for channel in self._channels.values():

@@ -55,8 +55,6 @@ class ClockService(Service):
         self._session = session
         self._begin_id = session.messages.id(BEGIN)
         self._senders = senders or SenderTable(session.messages)
-        answering = (each.data_type for each in answers.filters)
-        self._heard = frozenset([*answering, *self._senders.ids])
         self._answers = answers
         self._lines = PrintedLines(session, self._over) if prints else None
         self._exchange = exchange = Exchange(session, path, roles.all, self._take, self._senders)
@@ -84,7 +82,6 @@ class ClockService(Service):
         ended: TestEnded | None = None
         try:
             self._stepper.connect()
-            self._exchange.ignore_services(self._heard)
             if (begin := self._await_begin()) is None:
                 return
             self._begun = time.monotonic()

@@ -143,7 +143,7 @@ def _face(path: Path, number: int, words: Sequence[bytes], material: bytes, mesh
     corners, spots = ([n + so_far if n < 0 else n - 1 for n in each] for each, so_far in numbers)
     if len(corners) < 3 or not all(0 <= each < len(mesh.vertices) for each in corners):
         known = f"of three or more of its {len(mesh.vertices)} vertices"
-        raise InputError(path, f"'{_text(words)}' is not a face, expected as 'f 1 2 3' the numbers {known}", line=number)
+        raise InputError(path, f"'{_text(words)}' is not a face, expected as 'f 1 2 3' numbers {known}", line=number)
     return Face(number, corners, [each for each in spots if each >= 0], material)
 
 
