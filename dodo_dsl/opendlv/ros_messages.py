@@ -17,12 +17,10 @@ from dodo_dsl.opendlv import ros_types as ros
 from dodo_dsl.opendlv.attitude import heading_of, quaternion
 from dodo_dsl.opendlv.envelope import MICROSECONDS
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
-from dodo_dsl.opendlv.ros_codec import Codec, Fields, RosTypeError, require_ros
+from dodo_dsl.opendlv.ros_codec import Codec, Fields, RosTypeError
 from dodo_dsl.opendlv.ros_fields import CONSTANTS, PATHS
 from dodo_dsl.opendlv.ros_pictures import PICTURES, CameraPicture, encoding_of, picture_fields
 from dodo_dsl.opendlv.ros_types import StaticFrame, Topic
-
-__all__ = ["BusMessage", "CameraPicture", "RosTypeError", "Types", "messages_of", "require_ros", "stamp_of", "time_of"]
 
 
 class BusMessage(NamedTuple):

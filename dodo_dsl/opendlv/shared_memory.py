@@ -8,7 +8,7 @@ import errno
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from typing import Self
 
 from dodo_dsl.opendlv import posix_memory, sysv_memory
@@ -42,15 +42,15 @@ class SharedMemory:
         self._closed = False
 
     @classmethod
-    def create(cls, name: str, size: int, posix: bool | None = None) -> Self:
+    def create(cls, name: str, size: int) -> Self:
         """Make memory of ``size`` bytes, all zero, and what belongs to it; ``close`` removes it all.
 
-        What a dead creator left under this name is removed first. ``posix`` selects the mode (by default the
-        environment does). Raises SharedMemoryError, also if a living process holds memory of this name.
+        What a dead creator left under this name is removed first. Raises SharedMemoryError, also if a living process
+        holds memory of this name.
         """
         if not 0 < size < 2**32:
             raise SharedMemoryError(f"shared memory '{name}' cannot have {size} bytes")
-        if _wants_posix() if posix is None else posix:
+        if _wants_posix():
             return cls(PosixSegment.create(posix_memory.path_of(name), size), name, owner=True)
         return cls(Segment.create(sysv_memory.path_of(name), size), name, owner=True)
 
@@ -62,7 +62,7 @@ class SharedMemory:
         SharedMemoryError if there is neither.
         """
         token = sysv_memory.path_of(name)
-        if not token.exists() and (_wants_posix() or _is_posix(name)):
+        if not token.exists() and (_wants_posix() or (posix_memory.FOLDER / name.removeprefix("/")).exists()):
             return cls(PosixSegment.attach(posix_memory.path_of(name)), name, owner=False)
         return cls(Segment.attach(token), name, owner=False)
 
@@ -122,11 +122,9 @@ class SharedMemory:
     @property
     def is_there(self) -> bool:
         """Whether it still exists: one that cannot be locked may only be held for long by another program."""
-        try:
-            self.readers_waiting()
-        except SharedMemoryError:
-            return False
-        return True
+        with suppress(SharedMemoryError):
+            return self.readers_waiting() >= 0
+        return False
 
     def close(self) -> None:
         """Let go; the creator wakes all that wait and removes everything."""
@@ -168,7 +166,3 @@ class SharedMemory:
 
 def _wants_posix() -> bool:
     return os.environ.get(MODE, "").startswith("1")
-
-
-def _is_posix(name: str) -> bool:
-    return (posix_memory.FOLDER / name.removeprefix("/")).exists()

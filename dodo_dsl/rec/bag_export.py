@@ -14,7 +14,8 @@ from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.ros_codec import Fields, RosTypeError
-from dodo_dsl.opendlv.ros_messages import CameraPicture, Types
+from dodo_dsl.opendlv.ros_messages import Types
+from dodo_dsl.opendlv.ros_pictures import CameraPicture
 from dodo_dsl.opendlv.ros_types import COMPRESSED, DETECTIONS, CameraView, Topic
 from dodo_dsl.opendlv.ros_types import IMAGE as IMAGE_TYPE
 from dodo_dsl.opendlv.video import CODECS, VideoError

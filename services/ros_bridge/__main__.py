@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 
-from dodo_dsl.opendlv.ros_messages import RosTypeError, require_ros
+from dodo_dsl.opendlv.ros_codec import RosTypeError, require_ros
 from dodo_dsl.opendlv.ros_types import RosGraph
 from dodo_dsl.opendlv.session import SessionError
 

@@ -20,7 +20,9 @@ from typing import Any, NoReturn
 from dodo_dsl.opendlv import ros_types
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.pixels import PixelError, view
-from dodo_dsl.opendlv.ros_messages import CameraPicture, RosTypeError, Types, stamp_of, time_of
+from dodo_dsl.opendlv.ros_codec import RosTypeError
+from dodo_dsl.opendlv.ros_messages import Types, stamp_of, time_of
+from dodo_dsl.opendlv.ros_pictures import CameraPicture
 from dodo_dsl.opendlv.ros_types import CLOCK, CLOCK_TYPE, FRAME_IDS, RosGraph, Topic
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError

@@ -20,7 +20,8 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
-from dodo_dsl.opendlv.ros_messages import RosTypeError, Types
+from dodo_dsl.opendlv.ros_codec import RosTypeError
+from dodo_dsl.opendlv.ros_messages import Types
 
 # Fragments of a whole datagram, heartbeats soon after a lost one, buffers that hold some pictures, and no type
 # information of Fast DDS (vendor 1.15), which Cyclone cannot complete

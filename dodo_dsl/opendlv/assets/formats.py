@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.assets import map_file, mesh_text
-from dodo_dsl.opendlv.assets.json_file import read_bytes
+from dodo_dsl.opendlv.assets.json_file import read_bytes, unread
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.picture_size import problem_of
 
@@ -60,7 +60,7 @@ def _obstacles(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError
     if settings.get("bodies") == "true" and not {*map(str, map_file.read_frames(path))} - {settings["frame-id"]}:
         yield InputError(file, map_file.NO_BODIES, hint='give the model of another vehicle "frames": [1]')
     map_file.read_obstacles(path)
-    yield from map_file.unread_keys(file, map_file.document_of(file))
+    yield from unread(file, map_file.document_of(file), map_file.LISTS)
 
 
 def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:

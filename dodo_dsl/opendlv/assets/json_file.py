@@ -125,13 +125,13 @@ def near(word: str, known: Iterable[str]) -> str:
     return f"did you mean '{close[0]}'?" if close else ""
 
 
-def unread(file: Path, document: Any, lists: dict[str, type[Struct]]) -> Iterator[InputError]:
+def unread(file: Path, document: dict[str, Any], lists: dict[str, type[Struct]]) -> Iterator[InputError]:
     """Keys of a document, and of the entries of its lists, that nothing reads, each once."""
     yield from _unread(file, [("$", document)], lists)
     for key, kind in lists.items():
-        listed = document.get(key) if isinstance(document, dict) else None
-        numbered = enumerate(listed if isinstance(listed, list) else ())
-        yield from _unread(file, ((f"$.{key}[{n}]", each) for n, each in numbered), kind.__struct_encode_fields__)
+        listed = document[key] if isinstance(document.get(key), list) else []
+        entries = [(f"$.{key}[{number}]", each) for number, each in enumerate(listed)]
+        yield from _unread(file, entries, kind.__struct_encode_fields__)
 
 
 def _unread(file: Path, objects: Iterable[tuple[str, Any]], known: Collection[str]) -> Iterator[InputError]:

@@ -4,7 +4,7 @@ Models and textures are not loaded yet.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar
@@ -133,7 +133,7 @@ class MapFile(NamedTuple):
     overlays: tuple[OverlayEntry, ...] = ()
 
 
-_LISTS: dict[str, type[Struct]] = {
+LISTS: dict[str, type[Struct]] = {
     "model": ModelEntry,
     "block": BlockEntry,
     "overlay": OverlayEntry,
@@ -183,11 +183,7 @@ def problems(path: Path) -> tuple[MapFile | None, list[InputError]]:
     except InputError as error:
         return None, [error]
     read = _collected(file, document, found.append)
-    return read, [*found, *unread_keys(file, document)]
-
-
-def unread_keys(file: Path, document: object) -> Iterator[InputError]:
-    return unread(file, document, _LISTS)
+    return read, [*found, *unread(file, document, LISTS)]
 
 
 def _collected(file: Path, document: object, report: Report) -> MapFile:

@@ -235,8 +235,9 @@ def test_whom_the_end_wakes_does_not_read_the_last_content_again(
     assert is_over.is_set() and seen == []
 
 
-def test_waiting_for_posix_memory_ends(memory_name: str) -> None:
-    with SharedMemory.create(memory_name, 1, posix=True) as memory, SharedMemory.attach(memory_name) as reader:
+def test_waiting_for_posix_memory_ends(memory_name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLUON_SHAREDMEMORY_POSIX", "1")
+    with SharedMemory.create(memory_name, 1) as memory, SharedMemory.attach(memory_name) as reader:
         assert reader.wait(0.0) is False
         assert reader.wait(0.02) is False
         failures: list[str] = []

@@ -16,8 +16,8 @@ from dodo_dsl.opendlv import pixels
 from dodo_dsl.opendlv import ros_types as ros
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.ros_fields import PATHS
-from dodo_dsl.opendlv.ros_messages import CameraPicture, Types
-from dodo_dsl.opendlv.ros_pictures import picture_of
+from dodo_dsl.opendlv.ros_messages import Types
+from dodo_dsl.opendlv.ros_pictures import CameraPicture, picture_of
 from dodo_dsl.opendlv.ros_types import CameraView, StaticFrame, Topic
 from tests.opendlv.ros.values import plain
 
