@@ -112,6 +112,7 @@ def test_the_set_by_content_or_flag(record: Callable[..., Path]) -> None:
     [
         (1032, "1.0", "opendlv.proxy.MagneticFieldReading"),
         (1118, "0.9", "opendlv.logic.sensation.Orientation"),
+        (49, "1.0", "opendlv.proxy.PointCloudReading"),
     ],
 )
 def test_messages_of_either_set(id_: int, version: str, name: str, record: Callable[..., Path]) -> None:
