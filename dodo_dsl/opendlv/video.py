@@ -140,6 +140,7 @@ class VideoEncoder:
             raise VideoError(f"images of {width} x {height} pixels cannot be encoded: {error}") from None
 
     def encode(self, picture: NDArray[np.uint8]) -> bytes:
+        """The packet of an image, shaped as ``pixels.view`` has it; raises VideoError."""
         frame = self._frame(picture)
         frame.pts = self._next * 100_000
         self._next += 1

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from dodo_dsl.opendlv.address import IMAGE
-from dodo_dsl.opendlv.assets import map_file, mesh_text
+from dodo_dsl.opendlv.assets import map_file, mesh_text, recording_contents
 from dodo_dsl.opendlv.assets.json_file import read_bytes, unread
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.picture_size import problem_of
@@ -86,7 +86,7 @@ def _target(path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
     message = settings["target-message"] or settings["message"]
     sender = settings["target-sender"] or settings["sender"]
     if message in ids and sender.isdecimal():
-        yield from _contents(path, ids[message], int(sender), message, is_needed=True)
+        yield from recording_contents.problems(path, ids[message], int(sender), message, is_needed=True)
 
 
 def _way_points(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
@@ -108,13 +108,7 @@ def _car(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
 def _recording(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
     sender = settings.get("video-sender", "") if settings.get("video") == "true" else ""
     wanted = (IMAGE, int(sender)) if sender.isdecimal() else (-1, 0)
-    yield from _contents(path, *wanted, "pictures", is_needed=False)
-
-
-def _contents(path: Path, message: int, sender: int, name: str, *, is_needed: bool) -> Iterator[InputError]:
-    from dodo_dsl.opendlv.assets import recording_contents
-
-    return recording_contents.problems(path, message, sender, name, is_needed)
+    yield from recording_contents.problems(path, *wanted, "pictures", is_needed=False)
 
 
 def _pictures(path: Path, _settings: Settings, ids: Ids) -> Iterator[InputError]:

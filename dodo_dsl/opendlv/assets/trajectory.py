@@ -156,14 +156,13 @@ def read_table(path: Path, height: float) -> list[PathPoint]:
 
 
 def read_points(texts: Iterable[str], height: float) -> list[PathPoint]:
-    return [_written(text, height) for text in texts]
-
-
-def _written(text: str, height: float) -> PathPoint:
-    try:
-        x, y = map(number, text.split())
-    except ValueError:
-        x = y = math.nan
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise TrajectoryError(f"the point '{text}': expected two finite numbers x and y in m, such as '2 0.5'")
-    return PathPoint(f"the point '{text}'", x, y, height)
+    found: list[PathPoint] = []
+    for text in texts:
+        try:
+            x, y = map(number, text.split())
+        except ValueError:
+            x = y = math.nan
+        if not (math.isfinite(x) and math.isfinite(y)):
+            raise TrajectoryError(f"the point '{text}': expected two finite numbers x and y in m, such as '2 0.5'")
+        found.append(PathPoint(f"the point '{text}'", x, y, height))
+    return found
