@@ -58,6 +58,7 @@ class Connection:
                 return made
 
     def send(self, data: bytes) -> bool:
+        """Sends a message; whether the other end is there to take it."""
         try:
             while len(data) > PACKET:
                 self._socket.send(_MORE + data[:PACKET])
