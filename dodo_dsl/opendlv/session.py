@@ -69,6 +69,8 @@ def _passing(encoded: bytes) -> Iterator[Instruction]:
 
 MAX_DATAGRAM_BYTES = 65_507
 CIDS = range(1, 255)
+_ROOMY = 4_000_000
+"""Bytes of a receive buffer that hold what a fast bus carries while messages gather."""
 MAX_DROPPED = 1000  # before a flood of garbage can end a wait
 _NO_ROUTE = (errno.ENODEV, errno.ENETUNREACH)
 _IP_MULTICAST_ALL = 49  # Linux: linux/in.h
@@ -114,9 +116,7 @@ class Session:
             hint = " (is there a route to 224.0.0.0/4?)" if error.errno in _NO_ROUTE else ""
             raise SessionError(f"the bus {bus[0]}:{bus[1]} cannot be joined: {error.strerror}{hint}") from None
         self._bus = bus
-        self.gathers_s = 0.0
-        """Seconds in which messages gather after some were received, so that this process wakes once for several."""
-        self._may_gather = False
+        self._gathers, self._may_gather = 0.0, False
         self.hears_directly = False
         """Whether it receives what others send to its own address."""
         self._pending: dict[socket.socket, tuple[Envelope, Address]] = {}
@@ -161,6 +161,14 @@ class Session:
             with contextlib.suppress(OSError):
                 self._sender.sendto(frame, address)
         return frame
+
+    def gather(self, seconds: float) -> None:
+        """Lets messages gather after some were received, so that this process wakes once for several.
+
+        Not where the kernel grants so small a buffer that it would be full meanwhile.
+        """
+        room = self._receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+        self._gathers = seconds if room >= _ROOMY else 0.0
 
     def receive(self, timeout: float | None = 0.0) -> Envelope | None:
         """The next envelope of another member, with ``received`` set; None when ``timeout`` seconds are over.
@@ -217,6 +225,11 @@ class Session:
             _set_if_known(self._receiver, socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
             self._receiver.setsockopt(socket.IPPROTO_IP, socket.IP_DROP_MEMBERSHIP, membership)
             self.is_member = False
+
+    @property
+    def port(self) -> int:
+        """From which this session's datagrams come."""
+        return self.address[1]
 
     def close(self) -> None:
         self._receiver.close()
@@ -280,9 +293,9 @@ class Session:
 
     def _wait(self, deadline: float | None) -> bool:
         left = math.inf if deadline is None else deadline - time.monotonic()
-        if left > 0 and self._may_gather and self.gathers_s:
+        if left > 0 and self._may_gather and self._gathers:
             self._may_gather = False
-            time.sleep(min(self.gathers_s, left))
+            time.sleep(min(self._gathers, left))
             return True
         return left > 0 and bool(self._poll.poll(None if deadline is None else left * 1000))
 

@@ -42,15 +42,15 @@ class SharedMemory:
         self._closed = False
 
     @classmethod
-    def create(cls, name: str, size: int) -> Self:
+    def create(cls, name: str, size: int, posix: bool | None = None) -> Self:
         """Make memory of ``size`` bytes, all zero, and what belongs to it; ``close`` removes it all.
 
-        What a dead creator left under this name is removed first. Raises SharedMemoryError, also if a living process
-        holds memory of this name.
+        What a dead creator left under this name is removed first. ``posix`` selects the mode (by default the
+        environment does). Raises SharedMemoryError, also if a living process holds memory of this name.
         """
         if not 0 < size < 2**32:
             raise SharedMemoryError(f"shared memory '{name}' cannot have {size} bytes")
-        if _wants_posix():
+        if _wants_posix() if posix is None else posix:
             return cls(PosixSegment.create(posix_memory.path_of(name), size), name, owner=True)
         return cls(Segment.create(sysv_memory.path_of(name), size), name, owner=True)
 

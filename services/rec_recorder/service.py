@@ -63,7 +63,7 @@ def build(context: Context) -> Service:
     recording = RecordingFile(Path(flags["rec"]), _traffic(context))
     context.resources.callback(recording.close)
     if context.session is not None:
-        context.session.gathers_s = GATHERS
+        context.session.gather(GATHERS)
     cameras = snapshot = None
     if flags["frames"]:
         period = round(period_of(flags["frames"]))

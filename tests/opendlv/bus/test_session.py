@@ -155,7 +155,7 @@ def test_messages_gather_behind_one_that_came(cid: int, monkeypatch: pytest.Monk
     slept: list[float] = []
     with Session(cid) as session, Session(cid) as other:
         monkeypatch.setattr(time, "sleep", lambda seconds: (slept.append(seconds), other.send(STEERING())))
-        session.gathers_s = 0.05
+        session.gather(0.05)
         other.send(STEERING())
         assert session.receive(5.0) is not None and slept == []
         assert session.receive(5.0) is not None and slept == [0.05]
@@ -176,7 +176,7 @@ def test_nobody_has_a_session_s_port_at_another_local_address(cid: int) -> None:
     with Session(cid) as session, socket.socket(type=socket.SOCK_DGRAM) as other:
         other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         with pytest.raises(OSError, match="Address already in use"):
-            other.bind(("127.0.0.2", session.address[1]))
+            other.bind(("127.0.0.2", session.port))
 
 
 def test_a_session_knows_the_address_that_others_see(cid: int) -> None:
