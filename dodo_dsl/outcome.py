@@ -78,10 +78,9 @@ class MachineLoad:
 
 SLOW_ANSWERS = "slow-answers"
 """The check of how long answers took."""
-PEAK_MEMORY, MEMORY_GROWTH = "peak-memory", "memory-growth"
-PROCESSOR_TIME, PROCESSOR_SHARE = "processor-time", "processor-share"
+PEAK_MEMORY, PROCESSOR_TIME, PROCESSOR_SHARE = "peak-memory", "processor-time", "processor-share"
 """The checks of what each of the application's services uses, ``peak-memory-steering`` for example."""
-_OF_USE = tuple(f"{name}-" for name in (PEAK_MEMORY, MEMORY_GROWTH, PROCESSOR_TIME, PROCESSOR_SHARE))
+_OF_USE = tuple(f"{name}-" for name in (PEAK_MEMORY, PROCESSOR_TIME, PROCESSOR_SHARE))
 
 
 def differs_each_run(check: str) -> bool:
@@ -140,20 +139,11 @@ class ServiceUse:
     """Processor time by the test's own time: 1 is one processor all the time; null where the test had no time."""
     peak_memory_bytes: Count
     """The most memory that was seen, without programs and files that are only read."""
-    memory_growth_bytes_per_s: Measured
-    """How fast memory grew over the second half of the test, in bytes by a second of the test's own time; 0 if it did
-    not grow steadily, null where the test was too short to measure."""
-    memory_limit_bytes: Annotated[int, Meta(ge=1)] | None
-    """The memory that the service may use before it is ended; null if there is no limit."""
 
     def in_words(self) -> str:
         """The figures in a line."""
         share = "" if self.processor_share is None else f" ({self.processor_share * 100:.0f} % of a processor)"
-        used = f"{self.processor_s:.2f} s of processor time{share}, up to {megabytes(self.peak_memory_bytes)} of memory"
-        growth = self.memory_growth_bytes_per_s
-        if growth is None:
-            return f"{used}, and the test was too short to measure its growth"
-        return f"{used}, growing by {megabytes(growth * 60)}/min" if growth else used
+        return f"{self.processor_s:.2f} s of processor time{share}, up to {megabytes(self.peak_memory_bytes)} of memory"
 
 
 def megabytes(size: float) -> str:

@@ -170,7 +170,6 @@ _OF_THE_TEST = {
     "slow-answers": "",
     "uncopied-sample-times": "",
     "peak-memory-*": "MB",
-    "memory-growth-*": "MB/min",
     "processor-time-*": "s",
     "processor-share-*": "",
 }

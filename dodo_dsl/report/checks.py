@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 from markupsafe import Markup
 
 from dodo_dsl.outcome import (
-    MEMORY_GROWTH,
     PEAK_MEMORY,
     PROCESSOR_SHARE,
     PROCESSOR_TIME,
@@ -192,7 +191,6 @@ _OF_RESPONDS = {
 _FROM_TARGET = "largest distance of a sample from the target"
 _PREFIXES = {
     PEAK_MEMORY: "most memory that the service used at once",
-    MEMORY_GROWTH: "how fast the service's memory grew in the second half of the test",
     PROCESSOR_TIME: "processor time that the service used",
     PROCESSOR_SHARE: "processor time that the service used, divided by the test's time",
     "precision": "the same as precision, for one class",

@@ -118,7 +118,7 @@ class Engine:
             why = f"{type(error).__name__}: {error}"
             self.state.notes.append(f"load and use of the machine were not measured to the end: {why}")
         names = [service.name for service in self.plan.application.services]
-        self.state.resources = self._meter.figures(names, in_steps=self.plan.lockstep is not None)
+        self.state.resources = self._meter.figures(names)
         self.state.load = self._meter.load()
         self._is_measured = True
 

@@ -15,18 +15,17 @@ from dodo_dsl.spec.validation import schema_of_keys, values
 
 @dataclass(frozen=True)
 class ResourceLimits:
-    """Millions of bytes of memory, its growth in such in a minute, seconds on processors, and these by the test's time.
+    """Millions of bytes of memory, seconds on processors, and these by the test's time.
 
     None if there is no limit.
     """
 
     max_memory_mb: float | None = None
-    max_memory_growth: float | None = None
     max_processor_time_s: float | None = None
     max_processor_share: float | None = None
 
 
-_RESOURCES = ("max-memory", "max-memory-growth", "max-processor-time", "max-processor-share")
+_RESOURCES = ("max-memory", "max-processor-time", "max-processor-share")
 _PLAIN = ("name", "level", "kind", "clock", "rig", "isolation", "pose", "seed", "headline", "until")
 _VALUES = (*_PLAIN, "description", "timeout", "record", "response", "resources")
 

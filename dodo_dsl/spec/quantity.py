@@ -30,7 +30,6 @@ _FACTORS: dict[str, dict[str, Decimal]] = {
     "step count": {"steps": Decimal(1)},
     "step density": {"steps/m": Decimal(1), "steps/mm": Decimal(1000)},
     "angular step density": {"steps/rad": Decimal(1), "steps/deg": 180 / _PI},
-    "growth of memory": {"MB/min": Decimal(1), "kB/min": Decimal("0.001"), "MB/s": Decimal(60)},
     "mass": {"kg": Decimal(1), "g": Decimal("0.001")},
 }
 _DIMENSION = {unit: dimension for dimension, units in _FACTORS.items() for unit in units}

@@ -27,7 +27,7 @@ def test_margins_are_labelled_as_values_are() -> None:
 
 
 def test_what_the_application_used() -> None:
-    use = ServiceUse("steering", 1.2345, 0.4, 150_000_000, 0.0, None)
+    use = ServiceUse("steering", 1.2345, 0.4, 150_000_000)
     text = metrics_text([replace(OUTCOME, resources=(use,))])
     assert samples(text, "dodo_processor_seconds") == ['service="steering",test="test"} 1.234']
     assert samples(text, "dodo_peak_memory_bytes") == ['service="steering",test="test"} 150000000.0']
@@ -39,7 +39,7 @@ def test_an_error_has_no_margin() -> None:
 
 def test_text_of_others_commands_no_terminal() -> None:
     check = {"name": "a\x1b[31m\nb", "value": 1, "limit": {}, "unit": "m\x1b", "ok": True, "margin": 1}
-    use = ServiceUse("s\x1b", 1.0, 0.4, 1, 0.0, None)
+    use = ServiceUse("s\x1b", 1.0, 0.4, 1)
     text = metrics_text([replace(OUTCOME, slug="t\x1b", checks=(check,), resources=(use,))])
     assert "\x1b" not in text
     assert samples(text, "dodo_check_value") == ['check="a�[31m�b",test="t�",unit="m�"} 1.0']

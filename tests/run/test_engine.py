@@ -159,19 +159,17 @@ def using(used: Callable[[float], Snapshot | None], **more: Any) -> ScriptedBack
 
 def leaking(now: float) -> Snapshot:
     """By 400 MB in all."""
-    return Snapshot(now, {"app": Used(0.5 * now, 0.0, 100_000_000 + round(80e6 * (now - 2.0)), 2_000_000_000)})
+    return Snapshot(now, {"app": Used(0.5 * now, 0.0, 100_000_000 + round(80e6 * (now - 2.0)))})
 
 
 @pytest.mark.parametrize(("lockstep", "seconds"), [(0.0, 5.0), (60.0, 20.0)])
 def test_what_the_application_used_is_by_the_test_s_own_time(lockstep: float, seconds: float) -> None:
     found = outcome(using(leaking, lockstep=lockstep))
     (use,) = found.resources
-    assert (found.outcome, use.service, use.memory_limit_bytes) == ("passed", "app", 2_000_000_000)
+    assert (found.outcome, use.service) == ("passed", "app")
     assert (use.processor_s, use.processor_share) == (pytest.approx(2.5), pytest.approx(2.5 / seconds))
     assert use.peak_memory_bytes == pytest.approx(500e6, rel=0.01)
-    assert use.memory_growth_bytes_per_s == pytest.approx(400e6 / seconds, rel=0.05)
-    (note,) = found.notes
-    assert "to 500 MB so far: it would reach its limit of 2,000 MB in " in note
+    assert found.notes == ()
 
 
 def test_limits_of_what_the_application_uses_are_judged_before_it_has_passed() -> None:

@@ -56,11 +56,9 @@ def test_when_pictures_are_kept(tmp_path: Path, record: str, frames: tuple[str, 
     [
         ("", None, []),
         ("resources: {max-memory: 0.2 GB}", ResourceLimits(200.0), []),
-        ("resources: {max-memory-growth: 2 MB/s}", ResourceLimits(None, 120.0), []),
-        ("resources: {max-memory-growth: 0 kB/min}", ResourceLimits(None, 0.0), []),
         (
             "resources: {max-processor-time: 500 ms, max-processor-share: 50 %}",
-            ResourceLimits(None, None, 0.5, 0.5),
+            ResourceLimits(None, 0.5, 0.5),
             [],
         ),
         ("resources: {max-memory: 1 kB}", ResourceLimits(), ["out-of-range"]),

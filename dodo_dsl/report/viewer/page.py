@@ -15,7 +15,6 @@ from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import OdvdError
 from dodo_dsl.outcome import (
-    MEMORY_GROWTH,
     PEAK_MEMORY,
     PROCESSOR_SHARE,
     PROCESSOR_TIME,
@@ -39,7 +38,6 @@ _OF_THE_TEST = {SLOW_ANSWERS: "max", SAMPLE_TIMES: "sample-times"}
 """Checks of no evaluator, and the key of the test's ``response`` that asks for them."""
 _OF_USE = {
     PEAK_MEMORY: "max-memory",
-    MEMORY_GROWTH: "max-memory-growth",
     PROCESSOR_TIME: "max-processor-time",
     PROCESSOR_SHARE: "max-processor-share",
 }

@@ -12,18 +12,16 @@ from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.run.listeners import joined, listening
 from dodo_dsl.run.machine_load.processes import PROC
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used, UseReader
-from dodo_dsl.run.process import process_group
 
 ELSEWHERE = "the Docker engine runs its containers on another machine or in a virtual one"
-_OF_1, _OF_2 = ("total_rss", "total_shmem"), ("anon", "shmem")
-"""Anonymous and shared memory that the kernel counts for control groups (cgroups(7)) of both versions."""
+_MEMORY = (("total_rss", "total_shmem"), ("anon", "shmem"))
+"""Rows of anonymous and shared memory in what the engine says, of control groups of version 1 and 2."""
 
 
 class ContainerUse:
     """``containers`` are those of the engine's client, by service, ``application`` the application's.
 
-    What these use is by their control groups, which count what has ended, too; where these count no memory, as on a
-    Raspberry Pi by default, by processes. An engine elsewhere is asked, which takes a second.
+    What these use is by their processes here; an engine elsewhere is asked for its own figures.
     """
 
     def __init__(self, containers: Mapping[str, Any], application: Collection[str] = (), proc: Path = PROC) -> None:
@@ -33,7 +31,6 @@ class ContainerUse:
         self._reader = UseReader(proc)
         self._reader.sized.update(self._application)
         self._pids: dict[int, str] | None = None
-        self._last: Mapping[str, Used] = {}
         self._lock = threading.Lock()
 
     def take(self) -> Snapshot | None:
@@ -42,29 +39,8 @@ class ContainerUse:
             if self._pids is None:
                 self._pids = self.first(self._containers) or {}
             taken = self._reader.take(self._pids) if self._pids else Snapshot(time.monotonic(), {})
-            services = dict(taken.services)
-            for name, container in self._application.items():
-                pid = next((pid for pid, service in self._pids.items() if service == name), None)
-                here = process_group.counted(self._proc / str(pid), self._proc / "self") if pid else (0.0, {})
-                ran_s, rows = here if self._pids else self._asked(container)
-                seen, last, memory = services.get(name), self._last.get(name), _memory(rows)
-                if seen or last or memory is not None:
-                    seen = seen or Used()
-                    ran_s = max(ran_s, seen.processor_s, last.processor_s if last else 0.0)
-                    limit = int(container.attrs.get("HostConfig", {}).get("Memory") or 0)
-                    services[name] = Used(ran_s, seen.waited_s, seen.memory if memory is None else memory, limit)
-            self._last = services
-            return replace(taken, services=services, changes=0) if services else None
-
-    @staticmethod
-    def _asked(container: Any) -> tuple[float, Mapping[str, int]]:
-        """Processor time and rows of memory by the engine (``GET /containers/ID/stats``), if it knows."""
-        from docker.errors import DockerException
-
-        with contextlib.suppress(DockerException, OSError, KeyError, TypeError):
-            stats = container.client.api.stats(container.id, stream=False, one_shot=True)
-            return stats["cpu_stats"]["cpu_usage"]["total_usage"] * 1e-9, stats["memory_stats"]["stats"]
-        return 0.0, {}
+            services = dict(taken.services) or {n: use for n, c in self._application.items() if (use := _asked(c))}
+            return replace(taken, services=services) if services else None
 
     def listeners(self, names: Collection[str], cid: int) -> set[str] | None:
         """The services among ``names`` that listen on an OpenDLV bus already; None if that cannot be seen.
@@ -85,9 +61,16 @@ class ContainerUse:
         return None if None in found.values() else {pid: name for name, pid in found.items() if pid}
 
 
-def _memory(rows: Mapping[str, int]) -> int | None:
-    names = _OF_1 if _OF_1[0] in rows else _OF_2
-    return rows[names[0]] + rows.get(names[1], 0) if names[0] in rows else None
+def _asked(container: Any) -> Used | None:
+    """What a container used by the engine (``GET /containers/ID/stats``), if it knows."""
+    from docker.errors import DockerException
+
+    with contextlib.suppress(DockerException, OSError, KeyError, TypeError, StopIteration):
+        stats = container.client.api.stats(container.id, stream=False, one_shot=True)
+        rows = stats["memory_stats"]["stats"]
+        names = next(names for names in _MEMORY if names[0] in rows)
+        return Used(stats["cpu_stats"]["cpu_usage"]["total_usage"] * 1e-9, memory=sum(rows[name] for name in names))
+    return None
 
 
 def first_process(container: Any, proc: Path = PROC) -> int | None:

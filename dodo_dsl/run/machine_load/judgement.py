@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from dodo_dsl.outcome import (
-    MEMORY_GROWTH,
     PEAK_MEMORY,
     PROCESSOR_SHARE,
     PROCESSOR_TIME,
@@ -18,7 +17,6 @@ from dodo_dsl.outcome import (
     MachineLoad,
     Response,
     ServiceUse,
-    megabytes,
     with_margin,
 )
 from dodo_dsl.plan.model import Lockstep
@@ -87,9 +85,7 @@ MOST_SLOW = 0.1
 """Share of answers that may take longer than the frames' period before a note says so."""
 MOST_PERIODS = 10
 """The periods of frames that one answer may take before a note says so."""
-SOON_S = 600.0
-"""Memory that would reach its limit within this time, by the test's own, is worth a note."""
-_MB, _MINUTE_S = 1e6, 60.0
+_MB = 1e6
 
 
 @dataclass(frozen=True)
@@ -143,16 +139,13 @@ def _notes(response: Response) -> Iterator[str]:
 
 
 def judged_use(uses: Sequence[ServiceUse], limits: ResourceLimits | None) -> JudgedFigures:
-    """Judges what each service used by the limits of the test; its growth is noted whatever these are."""
-    judged = JudgedFigures().noted(*map(_growth_note, uses))
+    """Judges what each service used by the limits of the test."""
+    judged = JudgedFigures()
     if limits is None:
         return judged
     for use in uses:
-        growth = use.memory_growth_bytes_per_s
-        rate = None if growth is None else growth * _MINUTE_S / _MB
         for name, value, most, unit, words in (
             (PEAK_MEMORY, use.peak_memory_bytes / _MB, limits.max_memory_mb, "MB", "used {:,.4g} MB of memory"),
-            (MEMORY_GROWTH, rate, limits.max_memory_growth, "MB/min", "grew by {:,.4g} MB/min in memory"),
             (PROCESSOR_TIME, use.processor_s, limits.max_processor_time_s, "s", "took {:.2f} s of processor time"),
             (PROCESSOR_SHARE, use.processor_share, limits.max_processor_share, "", "took {:.0f} % of a processor"),
         ):
@@ -166,16 +159,3 @@ def judged_use(uses: Sequence[ServiceUse], limits: ResourceLimits | None) -> Jud
             reason = f"application service '{use.service}' {words.format(value if unit else 100 * value)}, {at_most}"
             judged = judged.judged(f"{name}-{use.service}", value, most, reason, use.service, unit, digits=3)
     return judged.noted("" if uses else UNSEEN_USE)
-
-
-def _growth_note(use: ServiceUse) -> str:
-    """What becomes of memory that grows, if that comes soon; the limit is that of the service."""
-    growth, limit = use.memory_growth_bytes_per_s, use.memory_limit_bytes
-    left_s = (limit - use.peak_memory_bytes) / growth if growth and limit else SOON_S
-    if left_s >= SOON_S or not growth:
-        return ""
-    soon = "at once" if left_s < 1 else f"in {left_s:.0f} s" if left_s < 2 * _MINUTE_S else f"in {left_s / 60:.0f} min"
-    return (
-        f"the memory of application service '{use.service}' grows by {megabytes(growth)} in a second of test time, to "
-        f"{megabytes(use.peak_memory_bytes)} so far: it would reach its limit of {megabytes(limit or 0)} {soon}"
-    )

@@ -1,13 +1,12 @@
 """Measures, at short intervals while a test runs, the load of the machine and what the application's services use.
 
-Use is processor time, memory, and how that grows.
+Use is processor time, and memory.
 """
 
 import asyncio
 import contextlib
-import statistics
-from collections.abc import Awaitable, Callable, Collection, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Awaitable, Callable, Collection
+from dataclasses import dataclass
 
 from dodo_dsl.outcome import MachineLoad, ServiceUse, Wait
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
@@ -23,14 +22,6 @@ FULL = 0.8
 """Share of the cores from which on the machine is full: rows of ticks of 10 ms are no more precise."""
 OTHERS = 0.5
 """Share of the time on processors with which others than the application take most of the machine."""
-LEAST_RISE = 1_000_000
-"""Bytes by which memory has to rise for a growth: less is what programs take and give back at any time."""
-_LEAST_SHARE = 1 / 6
-"""Of the rise that each half of it has to have: memory that is taken once, whenever that is, does not grow."""
-_LEAST_TIMES, _LEAST_STEPS = 3, 6
-_MOST_KEPT = 2000
-Point = tuple[float, float]
-"""Time of the test in s, and bytes of memory."""
 
 
 def period_s(passed_s: float, took_s: float = 0.0) -> float:
@@ -43,7 +34,6 @@ class _Service:
     first: Used
     last: Used
     peak: int = 0
-    points: list[Point] = field(default_factory=list)
     displaced_s: float = 0.0
 
 
@@ -105,10 +95,6 @@ class Meter:
             service = self._services.setdefault(name, _Service(Used() if self._first else used, used))
             service.last = used
             service.peak = max(service.peak, used.memory)
-            if used.memory:
-                service.points.append((self._times[-1], used.memory))
-            if len(service.points) > _MOST_KEPT:
-                del service.points[1:-1:2]
         self._first, self._last = self._first or snapshot, snapshot
         self._window = self._window or snapshot
         if snapshot.at_s - self._window.at_s >= WINDOW_S:
@@ -118,10 +104,10 @@ class Meter:
         """Adds up for how long others than the application filled the machine, and what services waited meanwhile.
 
         Nothing is put down to others that was so while the machine had free cores, or while the application itself took
-        most of them, or may have, by processes that came and went, and that nobody counts.
+        most of them.
         """
         self._window = after
-        if before.busy_s is None or after.busy_s is None or before.changes != after.changes:
+        if before.busy_s is None or after.busy_s is None:
             return
         took_s, busy_s = after.at_s - before.at_s, after.busy_s - before.busy_s
         spent = {name: _spent(before.services.get(name, Used()), used) for name, used in after.services.items()}
@@ -160,38 +146,17 @@ class Meter:
         waited_s, displaced_s = (spent[name][1], services[name].displaced_s) if spent else (0.0, 0.0)
         return Wait(sum(ran for ran, _ in spent.values()), min(waited_s, took_s), min(displaced_s, took_s), name)
 
-    def figures(self, names: Collection[str], in_steps: bool = False) -> tuple[ServiceUse, ...]:
-        """What each of some services used; ``in_steps`` as of ``growth``."""
+    def figures(self, names: Collection[str]) -> tuple[ServiceUse, ...]:
+        """What each of some services used."""
         passed_s, found = self._times[-1] - self._times[0] if self._times else 0.0, []
         for name in sorted({*names} & self._services.keys()):
             service = self._services[name]
             ran_s, _ = _spent(service.first, service.last)
             share = ran_s / passed_s if passed_s > 0 else None
-            rate = growth(service.points, in_steps)
-            found.append(ServiceUse(name, ran_s, share, service.peak, rate, service.last.limit or None))
+            found.append(ServiceUse(name, ran_s, share, service.peak))
         return tuple(found)
 
 
 def _spent(then: Used, now: Used) -> tuple[float, float]:
     """What a service ran and waited between two snapshots."""
     return max(now.processor_s - then.processor_s, 0.0), max(now.waited_s - then.waited_s, 0.0)
-
-
-def growth(points: Sequence[Point], in_steps: bool = False) -> float | None:
-    """Bytes a second by which memory grows in the second half of the time, in which programs have warmed up.
-
-    It is by the medians of its thirds, as single points may be anywhere. 0 where memory does not rise by LEAST_RISE, or
-    not from each third to the next. None if there are too few times of the test: more are needed if it goes on
-    ``in_steps``, as what was measured between two of them may be of either.
-    """
-    middle_s = (points[0][0] + points[-1][0]) / 2 if points else 0.0
-    found = [*{at_s: size for at_s, size in points if at_s >= middle_s}.items()]
-    if len(found) < (_LEAST_STEPS if in_steps else _LEAST_TIMES):
-        return None
-    third = len(found) // 3
-    ends = (map(statistics.median, zip(*part, strict=True)) for part in (found[:third], found[-third:]))
-    (begin_s, low), (last_s, high) = ends
-    rise, central = high - low, [size for _, size in found[third:-third]]
-    rises = statistics.median_low(central) - low, high - statistics.median_high(central)
-    is_steady = rise >= LEAST_RISE and min(rises) >= _LEAST_SHARE * rise
-    return rise / (last_s - begin_s) if is_steady else 0.0

@@ -23,7 +23,6 @@ _SMALL = 4 << 20
 """Bytes up to which it does not matter how much of their memory processes share."""
 _MEMFD = "/memfd:"
 _BLOCK = 512
-_TRIES = 3
 
 
 class Process(NamedTuple):
@@ -39,18 +38,10 @@ class Process(NamedTuple):
     is_zombie: bool
 
 
-def table(proc: Path = PROC, counted: Collection[int] = ()) -> dict[int, Process]:
-    """Every process.
-
-    A process that is waited for is in its parent's time from then on: if one of those that are ``counted`` ends as they
-    are read, all are read again.
-    """
-    for _ in range(_TRIES):
-        pids = [int(entry.name) for entry in proc.iterdir() if entry.name.isdigit()]  # all before the first is read
-        found = {pid: process for pid in pids if (process := _process(pid, proc))}
-        if found.keys() >= {*counted} & {*pids}:
-            break
-    return found
+def table(proc: Path = PROC) -> dict[int, Process]:
+    """Every process."""
+    pids = (int(entry.name) for entry in proc.iterdir() if entry.name.isdigit())
+    return {pid: process for pid in pids if (process := _process(pid, proc))}
 
 
 def _process(pid: int, proc: Path) -> Process | None:
@@ -87,18 +78,15 @@ def above(limits: Mapping[str, int], services: Mapping[int, str], proc: Path = P
     found, memories, owned = {}, segments(proc), owners(services, living(proc))
     for name, most in limits.items():
         pids = [pid for pid, owner in owned.items() if owner == name]
-        if memory(pids, memories, proc) > most and (size := memory(pids, memories, proc, is_exact=True)) > most:
+        if (size := memory(pids, memories, proc)) > most:
             found[name] = size
     return found
 
 
-def memory(pids: Collection[int], segments: Iterable["Segment"], proc: Path = PROC, is_exact: bool = False) -> int:
-    """Bytes that processes use together. With ``is_exact``, what they share counts once, if this user may know it.
-
-    That takes long, as the kernel looks at every page for it.
-    """
+def memory(pids: Collection[int], segments: Iterable["Segment"], proc: Path = PROC) -> int:
+    """Bytes that processes use together. What they share counts once, if this user may know it."""
     sizes = [_sizes(f"{proc}/{pid}/status") or (0, 0) for pid in pids]
-    if is_exact and sum(map(sum, sizes)) - max(map(sum, sizes), default=0) > _SMALL:
+    if sum(map(sum, sizes)) - max(map(sum, sizes), default=0) > _SMALL:
         sizes = [_sizes(f"{proc}/{pid}/smaps_rollup") or size for pid, size in zip(pids, sizes, strict=True)]
     anonymous, shared = (sum(size[part] for size in sizes) for part in (0, 1))
     attached, detached = _of_service(segments, pids, proc)

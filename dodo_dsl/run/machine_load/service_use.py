@@ -4,31 +4,25 @@ import contextlib
 import os
 import time
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from dodo_dsl.run.machine_load.processes import PROC, Segment, memory, owners, segments, table
+from dodo_dsl.run.machine_load.processes import PROC, memory, owners, segments, table
 
 _BUSY = (0, 1, 2, 5, 6, 7)
 """Columns of ``/proc/stat`` (proc_stat(5)) in which a core is not free; that of guests is part of the user's."""
 _TICKS = os.sysconf("SC_CLK_TCK")
 _NANOSECONDS = 1e-9
-_SHARED_S, _TIMES_COST = 0.25, 100
-"""For how long, and how many times as long as it took to find it out, what processes share is taken to be so."""
 
 
 class Used(NamedTuple):
-    """Seconds on processors and ready to run without one since a service began, and bytes of memory now.
-
-    ``limit`` of memory in bytes, 0 for none. A service that has ended has no memory.
-    """
+    """Seconds on processors and ready to run without one since a service began, and bytes of memory now."""
 
     processor_s: float = 0.0
     waited_s: float = 0.0
     memory: int = 0
-    limit: int = 0
 
 
 @dataclass(frozen=True)
@@ -36,15 +30,13 @@ class Snapshot:
     """What the ``services`` of a test used so far; ``at_s`` by the monotonic clock.
 
     The service ``''`` is for processes that belong to none. ``busy_s`` is how long the ``cores`` that the test may use
-    were busy with any process, None where the kernel does not say, or not who waits. ``changes`` is another number when
-    processes or threads began or processes ended, whose time may be in no service's account.
+    were busy with any process, None where the kernel does not say, or not who waits.
     """
 
     at_s: float
     services: Mapping[str, Used]
     cores: int = 0
     busy_s: float | None = None
-    changes: int = 0
 
 
 class UseReader:
@@ -54,42 +46,33 @@ class UseReader:
         self.sized: set[str] = set()
         """The services of which memory is measured, too."""
         self._proc = proc
-        self._pids: dict[str, list[int]] = defaultdict(list)
         self._ticks: dict[str, int] = defaultdict(int)
         """What the processes said at last, and what is to be added, as some ended for which nobody waited."""
         self._lost: dict[str, int] = defaultdict(int)
         self._threads: dict[tuple[int, int, str], tuple[int, int]] = {}
         """Nanoseconds that each thread ran and waited, by its process, when that was started, and its own number."""
         self._waited: dict[str, int] = defaultdict(int)
-        self._shared: dict[str, tuple[Sequence[int], float, float]] = {}
-        """Which part of the memory of some processes counts, and until when that is taken to be so."""
-        self._ended = 0
-        """Processes that were seen and have ended since."""
 
     def take(self, services: Mapping[int, str]) -> Snapshot:
         """What ``services`` use, which are the ids of their first processes, and names; that of ``''`` is not counted.
 
         Time of processes that ended counts as far as it was seen, or as another one waited for them.
         """
-        before = {pid for pids in self._pids.values() for pid in pids}
-        known, self._pids = table(self._proc, before), defaultdict(list)
+        known, pids = table(self._proc), defaultdict[str, list[int]](list)
         owned = {pid: name for pid, name in owners(services, known).items() if name or services.get(pid) != ""}
         for pid, name in owned.items():
-            self._pids[name].append(pid)
-        self._ended += len(before - owned.keys())
-        for name in {*filter(None, services.values()), *self._ticks, *self._pids}:
-            ticks = sum(known[pid].ticks for pid in self._pids[name])
-            self._lost[name] += max(self._ticks[name] - ticks, 0)
-            self._ticks[name] = ticks
+            pids[name].append(pid)
         self._add_waits({pid: (name, known[pid].start) for pid, name in owned.items()})
         cores, memories = os.sched_getaffinity(0), segments(self._proc) if self.sized else []
         found = {}
-        for name in self._ticks:
-            living = [pid for pid in self._pids[name] if not known[pid].is_zombie]
-            size = self._memory(name, living, memories) if living and name in self.sized else 0
-            ticks = self._ticks[name] + self._lost[name]
-            found[name] = Used(ticks / _TICKS, self._waited[name] * _NANOSECONDS, size)
-        return Snapshot(time.monotonic(), found, len(cores), self._busy_s(cores), self._ended + self._begun())
+        for name in {*filter(None, services.values()), *self._ticks, *pids}:
+            ticks = sum(known[pid].ticks for pid in pids[name])
+            self._lost[name] += max(self._ticks[name] - ticks, 0)
+            self._ticks[name] = ticks
+            living = [pid for pid in pids[name] if not known[pid].is_zombie]
+            size = memory(living, memories, self._proc) if living and name in self.sized else 0
+            found[name] = Used((ticks + self._lost[name]) / _TICKS, self._waited[name] * _NANOSECONDS, size)
+        return Snapshot(time.monotonic(), found, len(cores), self._busy_s(cores))
 
     def _add_waits(self, owned: Mapping[int, tuple[str, int]]) -> None:
         """Adds what services waited since the last call, as long as the thread that ran the most, which does the work.
@@ -109,27 +92,12 @@ class UseReader:
             self._waited[name] += waited
         self._threads = threads
 
-    def _memory(self, name: str, pids: Sequence[int], memories: Sequence[Segment]) -> int:
-        """Bytes; which part of it counts, as processes share it, is found out seldom, and when there are others."""
-        size = memory(pids, memories, self._proc)
-        among, part, until_s = self._shared.get(name, ((), 1.0, 0.0))
-        if pids != among or time.monotonic() >= until_s:
-            began = time.thread_time()
-            part = min(memory(pids, memories, self._proc, is_exact=True) / max(size, 1), 1.0)
-            until_s = time.monotonic() + max(_TIMES_COST * (time.thread_time() - began), _SHARED_S)
-            self._shared[name] = pids, part, until_s
-        return int(size * part)
-
     def _busy_s(self, cores: Collection[int]) -> float | None:
         try:
             (self._proc / "self" / "schedstat").stat()
             return busy_s((self._proc / "stat").read_text(), cores)
         except OSError:
             return None
-
-    def _begun(self) -> int:
-        """The last number of a process or thread in this process's own namespace; 0 elsewhere, as others begin too."""
-        return int((self._proc / "loadavg").read_text().split()[-1]) if os.getpid() == 1 else 0
 
 
 def _threads(folder: Path) -> Iterable[tuple[str, tuple[int, int]]]:

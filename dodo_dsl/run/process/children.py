@@ -6,7 +6,6 @@ A Python module that is forked instead of started has what its parent has loaded
 import contextlib
 import functools
 import os
-import resource
 import runpy
 import signal
 import subprocess
@@ -14,12 +13,11 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
 from dodo_dsl.run.machine_load.processes import above, living, owners
-from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.confined_process import ConfinedProcess
 from dodo_dsl.run.process.confinement import Confinement
@@ -118,9 +116,6 @@ class Children:
         self._umask = umask
         self._running: dict[str, Child] = {}
         self._used: dict[str, int] = {}
-        self._took_s: dict[str, float] = {}
-        """Processor time of those that ended, with that of their own children."""
-        self._is_all_counted = True
         self.limits: dict[str, int] = {}
         """Bytes of memory that the application's programs may use."""
         self.names: dict[int, str] = {}
@@ -168,20 +163,7 @@ class Children:
         """Starts a program of the application; raises as ``start``, and NoSeccomp."""
         child = ConfinedProcess(words, environment, output, confined, places, self._umask)
         self.limits[name] = confined.limits.memory
-        self._is_all_counted &= child.used_s() is not None
         return self._add(name, child)
-
-    def with_ended(self, taken: Snapshot) -> Snapshot:
-        """What services used, with the processes of the application's programs that ended, and with their limits."""
-        running = {n: c.used_s() or 0.0 for n, c in self._running.items() if isinstance(c, ConfinedProcess)}
-        took_s = {**self._took_s, **running}
-        services = {
-            name: used._replace(
-                processor_s=max(used.processor_s, took_s.get(name, 0.0)), limit=self.limits.get(name, 0)
-            )
-            for name, used in taken.services.items()
-        }
-        return replace(taken, services=services, changes=0 if self._is_all_counted else taken.changes)
 
     @property
     def are_watched(self) -> bool:
@@ -210,9 +192,7 @@ class Children:
                     os.waitpid(info.si_pid, 0)
                 else:
                     child = self._running.pop(name)
-                    counted, before = (child.used_s() if isinstance(child, ConfinedProcess) else None), _of_children_s()
                     code = child.wait()
-                    self._took_s[name] = max(counted or 0.0, _of_children_s() - before)
                     failed = isinstance(child, ConfinedProcess) and child.failed
                     self._on_exit(name, ChildExit(code, self._used.pop(name, 0), failed))
 
@@ -239,12 +219,6 @@ class Children:
                     os.kill(pid, signal.SIGKILL)
             time.sleep(_KILL_S)
             self.reap()
-
-
-def _of_children_s() -> float:
-    """Processor time of the children that this process waited for, and of theirs."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def _begin(parent: int, masked: Sequence[str]) -> None:

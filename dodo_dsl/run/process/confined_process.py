@@ -13,12 +13,13 @@ import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from dodo_dsl.run.process import confinement, namespaces, process_group, seccomp_filter
+from dodo_dsl.run.process import confinement, namespaces, seccomp_filter
 from dodo_dsl.run.process.confinement import PROGRAM, Confinement
 from dodo_dsl.run.process.places import Places
-from dodo_dsl.run.process.process_group import ProcessGroup
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
+_OURS = 2
+"""Processes of a service's sandbox that are not the application's: bubblewrap, and the first of its namespace."""
 _SIGNALLED = range(129, 129 + 64)
 """Exit codes by which bubblewrap reports the signal that ended the program."""
 _BEGAN = b'"exit-code"'
@@ -44,7 +45,6 @@ class ConfinedProcess:
         others = 0 if user is not None else _threads_of_this_user()
         sandbox = confinement.sandbox_words(confined, places, program, given)
         filtered = {"--seccomp": seccomp_filter.program()} if places else {}
-        self._group = process_group.make(confined.limits.processes)
         self._status, status = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         try:
             with _in_files(filtered) as passed, os.fdopen(status, "wb"):
@@ -66,18 +66,14 @@ class ConfinedProcess:
                         group=user,
                         extra_groups=None if user is None else [],
                         pass_fds=(*passed.values(), *files.values()),
-                        preexec_fn=functools.partial(_limit, confined.limits, os.getpid(), self._group, others),  # noqa: PLW1509
+                        preexec_fn=functools.partial(_limit, confined.limits, os.getpid(), others),  # noqa: PLW1509
                     )
         except BaseException:
-            self._close()
+            os.close(self._status)
             raise
         self.pid = self._process.pid
         self.failed = False
         """Whether the program never began; known after ``wait``."""
-
-    def used_s(self) -> float | None:
-        """Processor time in s, also of all that ended; None if it has no control group that counts it."""
-        return self._group.used_s() if self._group else None
 
     def wait(self) -> int:
         """The program's exit code, below 0 for the signal that ended it."""
@@ -87,13 +83,8 @@ class ConfinedProcess:
         except BlockingIOError:  # what it was to start has not ended yet
             said = b""
         self.failed = code > 0 and _BEGAN not in said
-        self._close()
-        return 128 - code if code in _SIGNALLED else code
-
-    def _close(self) -> None:
         os.close(self._status)
-        if self._group is not None:
-            self._group.remove()
+        return 128 - code if code in _SIGNALLED else code
 
 
 @contextlib.contextmanager
@@ -117,12 +108,11 @@ def _found(name: str, environment: Mapping[str, str], folder: str) -> str:
     return str(Path(folder, found))
 
 
-def _limit(limits: SandboxLimits, parent: int, group: ProcessGroup | None, others: int) -> None:
-    """Between fork and exec. Without a group the kernel counts processes by user, ``others`` of this one among them."""
+def _limit(limits: SandboxLimits, parent: int, others: int) -> None:
+    """Between fork and exec. The kernel counts processes by user, ``others`` of this one among them."""
     namespaces.end_with(parent)
-    if group is None or not group.join():
-        _set_limit(resource.RLIMIT_NPROC, limits.processes + process_group.OURS + 2 * others)
     for kind, most in (
+        (resource.RLIMIT_NPROC, limits.processes + _OURS + 2 * others),
         (resource.RLIMIT_CORE, 0),
         (resource.RLIMIT_NOFILE, limits.files),
         (resource.RLIMIT_FSIZE, limits.file_size),
@@ -146,6 +136,3 @@ def _threads_of_this_user(proc: Path = Path("/proc")) -> int:
                 if entry.stat().st_uid == os.getuid():
                     threads += sum(1 for _ in (entry / "task").iterdir())
     return threads
-
-
-PERIOD_S = 0.25

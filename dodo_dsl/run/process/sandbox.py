@@ -40,13 +40,14 @@ from dodo_dsl.run.listeners import listening
 from dodo_dsl.run.machine_load.service_use import UseReader
 from dodo_dsl.run.process import namespaces, places
 from dodo_dsl.run.process.children import Children
-from dodo_dsl.run.process.confined_process import PERIOD_S
 from dodo_dsl.run.process.confinement import Confinement
 from dodo_dsl.run.process.places import Places
 from dodo_dsl.run.process.seccomp_filter import NoSeccomp
 from dodo_dsl.run.process.slot import Entered
 
 HOST = "host"
+PERIOD_S = 0.25
+"""Between two looks at the memory of the application's programs."""
 MAX_MESSAGE = 1 << 17
 MAX_DESCRIPTORS = 250
 UMASK = 0o022
@@ -168,7 +169,7 @@ class Sandbox:
         """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""
         self.use.sized.update(names)
         taken = self.use.take({**self.children.names, os.getpid(): ""}) if _has_own_proc() else None
-        self.send(use=taken and asdict(self.children.with_ended(taken)))
+        self.send(use=taken and asdict(taken))
 
     def _do_listeners(self, _descriptors: list[int]) -> None:
         application = {pid: name for pid, name in self.children.names.items() if name in self.children.limits}

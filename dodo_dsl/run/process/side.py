@@ -198,6 +198,7 @@ class ProcessSide:
         application = self._plan.application
         hidden = [] if self._is_on_host else self._hidden
         limits = application.limits
+        limits = replace(limits, processes=limits.processes * len(application.services))  # of one user, as they count
         if self._commands.time is not None:
             limits = replace(limits, reads=(*limits.reads, str(self._commands.time.library)))
         if command.name == BRIDGE:

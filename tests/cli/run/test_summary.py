@@ -53,10 +53,10 @@ def test_verbose_shows_checks_use_and_what_services_complained_of(tmp_path: Path
     (logs / "application.steering.log").write_text("frame 0\nwarning: late\x07\nTraceback\n  File x\n")
     (logs / "evaluation.track.log").write_text("ready\n" + "error: no map\n" * 22)
     passed = replace(PASSED, checks=({"name": "gap", "value": 0.5, "limit": {"min": 0.1}, "unit": "m", "ok": True},))
-    passed = replace(passed, resources=(ServiceUse("steering", 1.5, 0.25, 150_000_000, 5e6, None),))
+    passed = replace(passed, resources=(ServiceUse("steering", 1.5, 0.25, 150_000_000),))
     stream, reported = StringIO(), Reported(plan(), tmp_path, Path("dodo-report/ok"))
     run_report.write_summary(stream, [passed], {"ok": "ok"}, [], Verbosity.VERBOSE, {"ok": reported})
-    used = "1.50 s of processor time (25 % of a processor), up to 150 MB of memory, growing by 300 MB/min"
+    used = "1.50 s of processor time (25 % of a processor), up to 150 MB of memory"
     assert stream.getvalue().splitlines()[2:11] == [
         "PASSED  ok    2.2 s    3.2 s  gap 0.5 m (at least 0.1 m)",
         "        reached it (set-up 1.0 s, ran 2.2 s)",

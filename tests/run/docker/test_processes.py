@@ -90,24 +90,10 @@ def test_a_test_on_the_network_of_another_host_does_not_begin(
         asyncio.run(begin())
 
 
-OF_1, OF_2 = "rss 5\nshmem 6\ntotal_rss 5000000\ntotal_shmem 1000000\n", "anon 5000000\nfile 777\nshmem 1000000\n"
 STATS = {
     "cpu_stats": {"cpu_usage": {"total_usage": 2_500_000_000}},
     "memory_stats": {"usage": 9, "stats": {"anon": 5_000_000, "shmem": 1_000_000}},
 }
-
-
-def counted(proc: Proc, kind: str, options: str, files: dict[str, str], shown: str = "/") -> None:
-    """What the kernel counts for the group of process 10, of which this process sees what is below ``shown``."""
-    names = "" if kind == "cgroup2" else options
-    groups = f"{0 if kind == 'cgroup2' else 4}:{names}:/docker/c0ffee\n"
-    with (proc.root / "10" / "cgroup").open("a") as group, (proc.root / "self" / "mountinfo").open("a") as mounts:
-        group.write(groups)
-        mounts.write(f"30 25 0:26 {shown} {proc.root}/{names or 'unified'} rw shared:4 - {kind} x rw,{options}\n")
-    folder = proc.root / (names or "unified") / Path("/docker/c0ffee").relative_to(shown)
-    folder.mkdir(parents=True)
-    for name, text in files.items():
-        (folder / name).write_text(text)
 
 
 def used(proc: Proc, **containers: Container) -> dict[str, Used] | None:
@@ -115,32 +101,17 @@ def used(proc: Proc, **containers: Container) -> dict[str, Used] | None:
     return None if taken is None else dict(taken.services)
 
 
-SEEN = Used(2.5, 0.01, 6_000_000, 9_000_000)
-
-
-@pytest.mark.parametrize("shown", ["/", "/docker", "/docker/c0ffee"])
-def test_what_containers_used_by_groups_of_version_1(proc: Proc, shown: str) -> None:
-    """Also where DoDo sees only a part of the groups, as in a container. What has ended has used what it had."""
-    counted(proc, "cgroup", "cpu,cpuacct", {"cpuacct.usage": "2500000000\n"}, shown)
-    counted(proc, "cgroup", "memory", {"memory.stat": OF_1}, shown)
-    counted(proc, "cgroup2", "nsdelegate", {"cpu.stat": "usage_usec 77\n"}, shown)
+def test_what_containers_used_by_their_processes(proc: Proc) -> None:
     app, sandbox, ended = Container("c0ffee", 10), Container("c0ffee", 11), Container("beef", 0)
     use = ContainerUse({"app": app, "ended": ended, SANDBOX: sandbox}, ["app"], proc.root)
-    assert (taken := use.take()) is not None and taken.services == {"app": SEEN}
+    assert (taken := use.take()) is not None and taken.services == {"app": Used(0.0, 0.01, 3 << 20)}
     proc.end(10)
-    assert (taken := use.take()) is not None and taken.services == {"app": SEEN._replace(memory=0)}
-
-
-@pytest.mark.parametrize(("files", "memory"), [({"memory.stat": OF_2}, 6_000_000), ({}, 3 << 20)])
-def test_what_containers_used_by_groups_of_version_2(proc: Proc, files: dict[str, str], memory: int) -> None:
-    """Also without the controller of memory."""
-    counted(proc, "cgroup2", "nsdelegate", {"cpu.stat": "usage_usec 2500000\nuser_usec 1\n", **files})
-    assert used(proc, app=Container("c0ffee", 10)) == {"app": SEEN._replace(memory=memory)}
+    assert (taken := use.take()) is not None and taken.services == {"app": Used(0.0, 0.01, 0)}
 
 
 def test_what_containers_used_on_another_machine(proc: Proc) -> None:
     """A process here may have the number of one there."""
-    assert used(proc, app=Container("c0ffee", 11, stats=STATS)) == {"app": SEEN._replace(waited_s=0.0)}
+    assert used(proc, app=Container("c0ffee", 11, stats=STATS)) == {"app": Used(2.5, 0.0, 6_000_000)}
 
 
 def test_the_load_is_measured_where_all_containers_run_here(proc: Proc) -> None:

@@ -1,9 +1,7 @@
-"""What snapshots add up to: who waited and whose fault it was, and how memory grows."""
+"""What snapshots add up to: who waited and whose fault it was, and what was used."""
 
 import asyncio
-import random
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 
 import pytest
 
@@ -12,7 +10,6 @@ from dodo_dsl.run.machine_load.meter import (
     FIRST_PERIOD_S,
     LAST_PATIENCE_S,
     Meter,
-    growth,
 )
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
 from tests.run.scripted import load, run
@@ -66,14 +63,6 @@ def test_a_wait_that_nobody_else_caused(others: float, app: tuple[float, float])
     assert (found.application.displaced_s, found.crowded_s) == (0.0, 0.0)
 
 
-def test_processes_that_came_and_went_may_have_been_the_others() -> None:
-    """Where nobody counts what they took, nothing is put down to others."""
-    at = load(0.8, app=(0.2, 0.3), camera=(0.2, 0.05))
-    found = added(replace(at(100.0 + n), changes=min(n, 4)) for n in range(11)).load()
-    assert found is not None and found.application is not None
-    assert (found.crowded_s, found.application.displaced_s) == (6.0, pytest.approx(1.8))
-
-
 def test_snapshots_are_taken_from_begin_to_end() -> None:
     async def scene() -> list[float]:
         times: list[float] = []
@@ -102,40 +91,12 @@ def test_a_backend_that_does_not_answer_holds_up_nothing_for_long() -> None:
     assert run(scene()) == pytest.approx(1.0 + LAST_PATIENCE_S)
 
 
-def noise(size: float) -> float:
-    return random.Random(size).uniform(-0.3 * MB, 0.3 * MB)
-
-
-@pytest.mark.parametrize(
-    ("sizes", "expected"),
-    [
-        ([100 * MB + 5 * MB * t for t in TIMES], 5 * MB),
-        ([100 * MB + 5 * MB * t + noise(t) for t in TIMES], pytest.approx(5 * MB, rel=0.1)),
-        ([100 * MB + 50 * MB * (n // 5) for n in range(60)], pytest.approx(100 * MB, rel=0.1)),
-        ([100 * MB + (900 * MB if n in (33, 50) else 0) + 5 * MB * t for n, t in enumerate(TIMES)], 5 * MB),
-        ([100 * MB + noise(t) for t in TIMES], 0.0),
-        ([100 * MB + 0.2 * MB * t for t in TIMES], 0.0),
-        ([100 * MB + min(t, 2.5) * 80 * MB for t in TIMES], 0.0),
-        ([100 * MB + (200 * MB if t > 4.4 else 0) for t in TIMES], 0.0),
-        ([100 * MB + (200 * MB if t > 5.5 else 0) for t in TIMES], 0.0),
-        ([300 * MB - 5 * MB * t for t in TIMES], 0.0),
-    ],
-    ids=["leak", "noisy", "stairs", "spikes", "quiet", "small", "warms-up", "once", "at-the-end", "falls"],
-)
-def test_growth(sizes: list[float], expected: float) -> None:
-    found = growth(list(zip(TIMES, sizes, strict=True)))
-    assert found == (pytest.approx(expected, rel=0.02) if isinstance(expected, float) else expected)
-
-
 def test_figures_are_by_the_test_s_own_time() -> None:
     """Ten times as fast as the wall: half of a processor by its time is a twentieth by the test's."""
     sizes = [900 * MB if n == 777 else 100 * MB + 10 * MB * 0.002 * n for n in range(5000)]
-    taken = [
-        Snapshot(50.0 + 0.002 * n, {"a": Used(3.0 + 0.001 * n, 0.0, int(size), 2_000_000_000)})
-        for n, size in enumerate(sizes)
-    ]
-    snapshots = [*taken, Snapshot(60.0, {"a": Used(8.0, 0.0, 0, 2_000_000_000)})]
+    taken = [Snapshot(50.0 + 0.002 * n, {"a": Used(3.0 + 0.001 * n, 0.0, int(size))}) for n, size in enumerate(sizes)]
+    snapshots = [*taken, Snapshot(60.0, {"a": Used(8.0, 0.0, 0)})]
     times = iter(10 * (snapshot.at_s - 50.0) for snapshot in snapshots)
     (use,) = added(snapshots, test_s=lambda: next(times)).figures(["a", "b"])
-    expected = ServiceUse("a", 5.0, pytest.approx(0.05), 900_000_000, pytest.approx(MB, rel=0.01), 2_000_000_000)
+    expected = ServiceUse("a", 5.0, pytest.approx(0.05), 900_000_000)
     assert (use, added([]).figures(["a"])) == (expected, ())
