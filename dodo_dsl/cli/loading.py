@@ -6,9 +6,8 @@ Only what takes no time to load is imported here.
 import argparse
 import contextlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
-from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process.fork_server import ForkServer
 
 _WITHOUT = {"-h", "--help", "docker", "--backend=docker", "host", "--isolation=host"}
 """Words of commands that hardly need one; a test of such a name only begins later."""
@@ -25,32 +24,14 @@ def begin(words: Sequence[str]) -> None:
         _ahead.append(server)
 
 
-@dataclass
-class Loading:
-    """A fork server until a backend takes it; ``descriptor`` is that of a lease which its sandboxes hold, too."""
-
-    descriptor: int
-    fork_server: ForkServer | None
-
-    def take(self) -> ForkServer | None:
-        taken, self.fork_server = self.fork_server, None
-        return taken
-
-
 @contextlib.contextmanager
-def loading(options: argparse.Namespace, descriptor: int) -> Iterator[Loading]:
-    """The one that has begun, or one that starts now, unless the options of ``dodo run`` say that none is needed.
-
-    One that nobody took ends.
-    """
-    load = Loading(descriptor, _ahead.pop() if _ahead else None)
+def loading(options: argparse.Namespace) -> Iterator[ForkServer | None]:
+    """The one that has begun, or one that starts now, unless the options of ``dodo run`` say that none is needed."""
+    server = _ahead.pop() if _ahead else None
+    if options.backend != "docker" and options.isolation != "host":
+        server = server or ForkServer()
     try:
-        if options.backend == "docker" or options.isolation == "host":
-            if unneeded := load.take():
-                unneeded.kill()
-        else:
-            load.fork_server = load.fork_server or ForkServer()
-        yield load
+        yield server
     finally:
-        if left := load.take():
-            left.kill()
+        if server is not None:
+            server.close()

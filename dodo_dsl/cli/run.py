@@ -13,7 +13,7 @@ from dodo_dsl.cli import display, progress, run_report, selection
 from dodo_dsl.cli.display import Verbosity, chatter
 from dodo_dsl.cli.errors import Exit, UsageError, of_outcomes
 from dodo_dsl.cli.forecast import at_once, expectation, run_forecast
-from dodo_dsl.cli.loading import Loading, loading
+from dodo_dsl.cli.loading import loading
 from dodo_dsl.cli.numbers import positive, seconds, seed, shard
 from dodo_dsl.cli.provenance import Origin, origin, recording
 from dodo_dsl.cli.report import REPORT
@@ -27,12 +27,13 @@ from dodo_dsl.report.next_report import next_report
 from dodo_dsl.report.repetitions import Repeated, repeated
 from dodo_dsl.report.report_folder import draw_test
 from dodo_dsl.report.results import Circumstances, GivenReport
-from dodo_dsl.run.backends import COMBINATIONS, Backends, CombinedBackends, Job
-from dodo_dsl.run.process.processes import may_enter
+from dodo_dsl.run.backends import COMBINATIONS, CombinedBackends, Job
+from dodo_dsl.run.process.fork_server import ForkServer
+from dodo_dsl.run.process.side import may_enter
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.runner import BackendName, Policy, Runner, default_backend
 from dodo_dsl.run.schedule import schedule
-from dodo_dsl.run.work_folder import reap_folders, work_folder
+from dodo_dsl.run.work_folder import WorkFolder, reap_folders, work_folder
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.model import CLOCKS, LEVELS
 from dodo_dsl.terminal import printable
@@ -146,14 +147,14 @@ def _main(options: argparse.Namespace, stdout: TextIO) -> int:
         from dodo_dsl.cli import watch
 
         return watch.main(options, stdout)
-    with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
+    with work_folder() as folder, loading(options) as server:
         with chatter(stdout, options.verbosity) as quietly:
             jobs, deployment = prepare(options, folder.path, quietly)
             if not jobs:
                 quietly.write("no test is in this part of the tests\n")
                 return Exit.OK
             _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
-            runner = runner_of(options, jobs, deployment, quietly, load)
+            runner = runner_of(options, jobs, deployment, quietly, folder, server)
         gc.freeze()
         gc.enable()
         source, said = origin(options, deployment), options.verbosity
@@ -176,7 +177,12 @@ def _refuse_to_keep(plans: Sequence[Plan]) -> None:
 
 
 def runner_of(
-    options: argparse.Namespace, jobs: Sequence[Job], deployment: Deployment, stdout: TextIO, load: Loading
+    options: argparse.Namespace,
+    jobs: Sequence[Job],
+    deployment: Deployment,
+    stdout: TextIO,
+    folder: WorkFolder,
+    server: ForkServer | None,
 ) -> Runner:
     plans = [job.plan for job in jobs]
     backend = options.backend or choose_backend(plans)
@@ -184,13 +190,13 @@ def runner_of(
     stdout.write(f"{progress.count(len(jobs))}, {at_once(order, jobs)}, {backend} backend; ")
     stdout.write(f"{run_forecast(order, jobs, backend)}\n")
     shown = progress.choose(stdout, [p.slug for p in plans], options.verbosity)
-    backends = _backends(options, backend, plans, deployment, load)
+    _require_possible(options, backend, plans)
+    cids, nets, held = deployment.cids, subnets(deployment.subnets), (folder.lease.descriptor,)
+    backends = CombinedBackends(backend, cids, nets, options.isolation, held, server)
     return Runner(shown, backends, order, Policy(options.fail_fast, options.retry_errors), options.keep)
 
 
-def _backends(
-    options: argparse.Namespace, backend: str, plans: Sequence[Plan], deployment: Deployment, load: Loading
-) -> Backends:
+def _require_possible(options: argparse.Namespace, backend: str, plans: Sequence[Plan]) -> None:
     if backend == "process":
         without = sorted({s.name for p in plans for s in p.application.services if not s.process})
         if without:
@@ -200,10 +206,6 @@ def _backends(
             )
     elif options.compiled and any(options.isolation not in (None, plan.isolation) for plan in plans):
         raise UsageError(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
-    return CombinedBackends(
-        backend, deployment.cids, subnets(deployment.subnets), options.isolation, (load.descriptor,),
-        load.take,
-    )  # fmt: skip
 
 
 def run(

@@ -57,7 +57,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         checked = own.selected([options.test])
         if checked.ok:
             refuse_search(options.test, checked.tests)
-        study = search_study(checked, own.compiled(checked), own.work, options.seed)
+        study = search_study(checked, own.compiled(checked), own.folder.path, options.seed)
         slug = study.test.spec.slug
         report = options.report.resolve() / "search" / slug
         place = str(report / STORE) if options.storage is None else options.storage

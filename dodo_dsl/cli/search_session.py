@@ -12,15 +12,16 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.display import write_diagnostics
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.forecast import expectation
-from dodo_dsl.cli.loading import Loading, loading
+from dodo_dsl.cli.loading import loading
 from dodo_dsl.cli.numbers import positive, seed
 from dodo_dsl.cli.progress import NoProgress
 from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors
 from dodo_dsl.diagnostics import has_errors, ordered
 from dodo_dsl.run.backends import CombinedBackends
+from dodo_dsl.run.process.fork_server import ForkServer
 from dodo_dsl.run.schedule import schedule
-from dodo_dsl.run.work_folder import reap_folders, work_folder
+from dodo_dsl.run.work_folder import WorkFolder, reap_folders, work_folder
 from dodo_dsl.search.drives import Drives, KeptBackends, end_like_interrupt
 from dodo_dsl.search.store import Store
 from dodo_dsl.search.study import Study
@@ -46,12 +47,12 @@ def add_common(parser: argparse.ArgumentParser, place: str) -> None:
 
 @dataclass(frozen=True)
 class SearchSession:
-    """One ``dodo search`` or ``dodo tune``; ``work`` takes what it compiles, and ``stdout`` may lose its reader."""
+    """One ``dodo search`` or ``dodo tune``; ``folder`` takes what it compiles, and ``stdout`` may lose its reader."""
 
     options: argparse.Namespace
     stdout: TextIO
-    work: Path
-    load: Loading
+    folder: WorkFolder
+    server: ForkServer | None
 
     def selected(self, words: Sequence[str]) -> compiler.Checked:
         """The tests that the words mean."""
@@ -71,12 +72,12 @@ class SearchSession:
         """Drives by processes."""
         deployment, options = study.checked.deployment, self.options
         backends = CombinedBackends(
-            "process", deployment.cids, isolation=options.isolation, descriptors=(self.load.descriptor,),
-            loaded=self.load.take,
+            "process", deployment.cids, isolation=options.isolation,
+            descriptors=(self.folder.lease.descriptor,), fork_server=self.server,
         )  # fmt: skip
         order = schedule(options.jobs, expectation(backends.name))
         progress = _Lines(self.stdout)
-        return Drives(study.checked, store, KeptBackends(backends), order, self.work, progress, folder, shared)
+        return Drives(study.checked, store, KeptBackends(backends), order, self.folder.path, progress, folder, shared)
 
 
 @contextmanager
@@ -85,8 +86,8 @@ def session(options: argparse.Namespace, stdout: TextIO) -> Iterator[SearchSessi
     more_descriptors()
     reap_folders()
     options.backend = "process"
-    with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
-        yield SearchSession(options, cast(TextIO, UninterruptedStream(stdout)), folder.path, load)
+    with work_folder() as folder, loading(options) as server:
+        yield SearchSession(options, cast(TextIO, UninterruptedStream(stdout)), folder, server)
 
 
 class _Lines(NoProgress):

@@ -46,7 +46,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     report = options.report.resolve() / FOLDER
     with session(options, stdout) as own:
         checked = own.selected(options.tests)
-        study = tune_study(checked, own.compiled(checked), own.work, options.samples)
+        study = tune_study(checked, own.compiled(checked), own.folder.path, options.samples)
         with opened(str(report / STORE), FOLDER, study.key) as store:
             driven = scenarios(study.checked.tests, options.samples, options.seed)
             drives = own.drives(study, store, report / "drives")

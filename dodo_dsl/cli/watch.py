@@ -116,7 +116,7 @@ class Watch:
     def run(self, changed: Collection[Path] | None) -> bool:
         """Runs what the changed files affect, all tests for None; returns whether it was interrupted."""
         self._changed |= {*(changed or ())}
-        with loading(self._options, self._folder.lease.descriptor) as load:
+        with loading(self._options) as server:
             forget_files()
             try:
                 jobs, deployment = prepare(self._options, self._folder.path, self._stdout)
@@ -133,7 +133,7 @@ class Watch:
                 return False
             if changed:
                 self._stdout.write(f"saved: {names}\n")
-            runner = cli_run.runner_of(self._options, chosen, deployment, self._stdout, load)
+            runner = cli_run.runner_of(self._options, chosen, deployment, self._stdout, self._folder, server)
             slugs = {job.plan.slug for job in jobs} - {job.plan.slug for job in chosen}
             others = [outcome for slug, outcome in self.outcomes.items() if slug in slugs]
             kept = GivenReport(BEFORE, others) if others else None

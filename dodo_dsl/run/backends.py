@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import tempfile
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Sequence
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Protocol
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.process import host_isolation
-from dodo_dsl.run.process.fork_server_client import ForkServer
-from dodo_dsl.run.process.processes import Processes
+from dodo_dsl.run.process.fork_server import ForkServer
+from dodo_dsl.run.process.side import Processes
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.run.rigs.ports import refuse_unattended
@@ -75,8 +75,7 @@ class CombinedBackends:
     """The backends of a combination, by its ``name``.
 
     On the host, processes take one of the ``cids``; ``subnets`` are for networks of containers. ``isolation`` is in
-    place of the tests' own. ``loaded`` gives a fork server that was started with the same ``descriptors`` while tests
-    were compiled.
+    place of the tests' own. What runs holds the leases of the ``descriptors``, too.
     """
 
     name: str
@@ -84,7 +83,7 @@ class CombinedBackends:
     subnets: Sequence[str] = ()
     isolation: str | None = None
     descriptors: tuple[int, ...] = ()
-    loaded: Callable[[], ForkServer | None] = lambda: None
+    fork_server: ForkServer | None = None
     _kinds: "list[Processes | Containers]" = field(default_factory=list)
     _alone: asyncio.Lock = field(default_factory=asyncio.Lock)
     """A queue without time limit for tests of this run that need the machine for themselves."""
@@ -93,7 +92,7 @@ class CombinedBackends:
         self._own, self._application = COMBINATIONS[self.name]
         is_whole = self._own == self._application
         if self._own == PROCESSES:
-            self._kinds.append(Processes(self.isolation, self.descriptors, self.loaded, is_whole))
+            self._kinds.append(Processes(self.isolation, self.fork_server, is_whole))
         if self._application == CONTAINERS:
             from dodo_dsl.run.docker.containers import Containers
 

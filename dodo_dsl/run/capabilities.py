@@ -3,7 +3,6 @@
 Programs are those that some tests need: a Docker engine, Compose, and the emulator of the rig's firmware.
 """
 
-import asyncio
 import contextlib
 import errno
 import os
@@ -48,10 +47,9 @@ _NO_ROUTE = (errno.ENETUNREACH, errno.ENODEV, errno.EADDRNOTAVAIL)
 
 def namespaces() -> Iterator[Capability]:
     """Whether tests can have their own namespaces."""
-    if refusal := asyncio.run(host_isolation.isolation_refusal()):
-        remedy = f"{refusal.remedy}; " if refusal.remedy else ""
-        way = f"{remedy}for applications you trust, --isolation host"
-        yield Capability("namespaces", "problem", f"an application cannot be isolated: {refusal.why}", way)
+    if why := host_isolation.isolation_refusal():
+        way = "for applications you trust, --isolation host"
+        yield Capability("namespaces", "problem", f"an application cannot be isolated: {why}", way)
     else:
         yield Capability("namespaces", "ok", "each test gets its own network, IPC and /tmp, its application a sandbox")
 

@@ -63,7 +63,7 @@ MOUNT_GONE = re.compile(r'bwrap: .*remount ".*": No such file or directory')
 MOST_TRIES = 10
 """How often it is started then."""
 HOME = "/home/application"
-_MERGED = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")
+MERGED = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")
 """On Debian since 12 these are links into /usr."""
 _EMPTY = ("/run", "/var/tmp")
 """Folders that programs may look into, and that nobody may write to."""
@@ -107,7 +107,7 @@ def _seen(confined: Confinement, places: Places, program: str) -> list[str]:
     Within them lies what is hidden, and in that again what may be read: outer paths come first.
     """
     shown = {path: ["--ro-bind-try", path, path] for path in SYSTEM}
-    for path in _MERGED:
+    for path in MERGED:
         is_link = Path(path).is_symlink()
         shown[path] = ["--symlink", str(Path(path).readlink()), path] if is_link else ["--ro-bind-try", path, path]
     reads = (*_programs(confined, program), *confined.reads)
@@ -144,6 +144,6 @@ def _time(folder: str) -> list[str]:
 
 def _programs(confined: Confinement, program: str) -> Sequence[str]:
     """The program's own file, where it lies in nothing that is shown."""
-    shown = [Path(path) for path in (*SYSTEM, *_MERGED, *confined.reads, confined.folder)]
+    shown = [Path(path) for path in (*SYSTEM, *MERGED, *confined.reads, confined.folder)]
     paths = dict.fromkeys((program, os.path.realpath(program)))
     return [path for path in paths if not any(Path(path).is_relative_to(folder) for folder in shown)]

@@ -3,10 +3,9 @@
 Loading numpy, OpenCV and similar takes most of the processor time of a short test's set-up. Sandboxes with their own
 namespaces are forked from here; their services are forks of them in turn.
 
-    runner to fork server   {"hold": true} with the descriptor of a lease that the forks hold, too;
-                            {"load": [module of a service of DoDo's, ...]};
-                            {"slot": name, "entered": as the sandbox has it} with the sandbox's end of its channel
-                            and its log's descriptor
+    runner to fork server   {"load": [module of a service of DoDo's, ...]}; with "entered", as the sandbox has it, and
+                            the descriptors of the sandbox's end of its channel, of its log, and of leases that it
+                            holds, too, it forks
 """
 
 import contextlib
@@ -16,16 +15,58 @@ import json
 import os
 import signal
 import socket
+import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
-from dodo_dsl.run.process import sandbox
-from dodo_dsl.run.process.slot import SLOT_VARIABLE
+from dodo_dsl.run.process.environment import own_environment
+from dodo_dsl.run.process.slot import Entered, package_path
 
-MAX_MESSAGE = 1 << 16
+_MAX_MESSAGE, _MAX_DESCRIPTORS = 1 << 16, 64
+
+
+class ForkServer:
+    """The runner's end of a fork server, which ends when this is closed, or with the runner.
+
+    It loads for a second before it serves; what is asked of it meanwhile waits.
+    """
+
+    def __init__(self) -> None:
+        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "dodo_dsl.run.process.fork_server", str(theirs.fileno())],
+                pass_fds=(theirs.fileno(),),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+                env={**own_environment(), "PYTHONPATH": package_path()},
+            )
+
+    def load(self, modules: Iterable[str]) -> None:
+        """Lets the sandboxes to come have loaded these services of DoDo's."""
+        self._send({"load": sorted(modules)})
+
+    def fork(self, entered: Entered, modules: Iterable[str], descriptors: Sequence[int]) -> None:
+        """Starts a sandbox that has loaded modules; the first ``descriptors`` are its end of a channel, and its log."""
+        self._send({"load": sorted(modules), "entered": entered.word()}, descriptors)
+
+    def _send(self, message: dict[str, object], descriptors: Sequence[int] = ()) -> None:
+        with contextlib.suppress(OSError):  # it has ended, which a sandbox's channel says
+            socket.send_fds(self._socket, [json.dumps(message).encode()], descriptors)
+
+    def close(self) -> None:
+        """Ends the fork server; the sandboxes stay."""
+        self._socket.close()
+        self._process.kill()
+        self._process.wait()
+
+
 _THREADS = "OPENBLAS_NUM_THREADS"
 """By default numpy's linear algebra starts threads when it is imported."""
 LOADED = (
+    "dodo_dsl.run.process.sandbox",
     "dodo_dsl.opendlv.session",
     "dodo_dsl.opendlv.shared_memory",
     "yaml",
@@ -71,34 +112,29 @@ def serve(runner: socket.socket) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # the kernel collects the forks
     while True:
-        data, descriptors, _, _ = socket.recv_fds(runner, MAX_MESSAGE, 2)
+        data, descriptors, _, _ = socket.recv_fds(runner, _MAX_MESSAGE, _MAX_DESCRIPTORS)
         if not data:
             return
         message = json.loads(data)
-        if "hold" in message:
-            os.set_inheritable(descriptors[0], True)
-            continue
-        if "load" in message:
-            load_services(message["load"])
-            continue
-        channel, log = descriptors
-        if os.fork() == 0:
-            os._exit(_sandbox(runner, channel, log, message["slot"], message["entered"]))
-        os.close(channel)
-        os.close(log)
+        load_services(message["load"])
+        if descriptors and os.fork() == 0:
+            runner.close()
+            os._exit(_sandbox(descriptors[0], descriptors[1], message["entered"]))
+        for descriptor in descriptors:
+            os.close(descriptor)
 
 
-def _sandbox(runner: socket.socket, channel: int, log: int, slot: str, entered: str) -> int:
+def _sandbox(channel: int, log: int, entered: str) -> int:
     """The fork's whole life; its exit code."""
-    runner.close()
+    from dodo_dsl.run.process import sandbox
+
     gc.enable()
     os.dup2(log, sys.stderr.fileno())
     os.close(log)
     os.setsid()
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-    os.environ[SLOT_VARIABLE] = slot
     try:
-        return sandbox.main([str(channel), entered, "--forks"])
+        return sandbox.serve(socket.socket(fileno=channel), Entered.of(entered))
     except BaseException:  # noqa: BLE001  (it is printed as Python does)
         sys.excepthook(*sys.exc_info())
         return 1

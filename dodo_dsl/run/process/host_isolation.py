@@ -4,85 +4,52 @@ import asyncio
 import contextlib
 import os
 import secrets
-import shutil
 import socket
 import struct
 import subprocess
 from collections.abc import AsyncIterator, Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
 from typing import Any
 
 from dodo_dsl.opendlv.address import group
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
-from dodo_dsl.run.process import leftovers
-from dodo_dsl.run.process.confinement import INTERPRETER, MOST_TRIES, MOUNT_GONE, PROGRAM, Confinement
-from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process import leftovers, seccomp_filter
+from dodo_dsl.run.process.confinement import MERGED, PROGRAM
 from dodo_dsl.run.process.leftovers import end_slot, remove_memories
-from dodo_dsl.run.process.sandbox_client import SandboxClient
-from dodo_dsl.run.process.slot import Entered, Slot
+from dodo_dsl.run.process.seccomp_filter import NoSeccomp
+from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.spec.deployment import RESERVED_CIDS
 
 PROBE_S = 0.3
 
 
-@dataclass(frozen=True)
-class IsolationRefusal:
-    """Why applications cannot be isolated, and what to do about it; ``remedy`` is empty where nothing is known."""
+def isolation_refusal(on_host: bool = False) -> str:
+    """Why applications cannot have their own namespaces here, and what to do; empty when they can.
 
-    why: str
-    remedy: str = ""
-
-
-async def isolation_refusal(fork_server: ForkServer | None = None) -> IsolationRefusal | None:
-    """Why tests and applications cannot have their own namespaces on this machine; None when they can.
-
-    What is missing is found by a trial: a program that does nothing is an application.
+    What is missing is found by a trial. On the host it is their own process namespace alone.
     """
-    ended: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
-
-    def take(message: dict[str, Any]) -> None:
-        if "started" not in message and not ended.done():
-            ended.set_result(message)
-
-    client = SandboxClient(take, lambda why: take({"why": why}), fork_server)
-    with os.fdopen(os.memfd_create("output"), "w+b") as output:
-        try:
-            await client.open(Slot(0), output.fileno(), Entered.with_own(0))
-        except BackendError as error:
-            if fork_server is not None and not fork_server.is_alive:
-                return IsolationRefusal(f"{error}, with the process that starts it")
-            in_container = "allow this container to make namespaces (docker run --privileged, for example)"
-            remedy = "allow user namespaces" if os.getuid() else in_container
-            return IsolationRefusal(f"the kernel refuses namespaces: {error}", remedy)
-        words = {"id": "true", "argv": ["true"], "env": {"PATH": os.defpath}, "cwd": "/", "fork": False, "masked": ()}
-        client.start({**words, "confined": asdict(Confinement("/usr", INTERPRETER))}, output.fileno())
-        answer = await ended
-        await client.close()
-        output.seek(0)
-        said = output.read(1000).decode(errors="replace").strip()
-    if answer.get("code") == 0:
-        return None
-    if shutil.which(PROGRAM) is None:
-        return IsolationRefusal(f"there is no program '{PROGRAM}'", "install bubblewrap")
-    why = answer.get("why") or said or f"exit code {answer.get('code')}"
-    return IsolationRefusal(f"a trial, to run 'true' in a sandbox as applications have it, ended with: {why}")
-
-
-def process_namespace_refusal() -> str:
-    """Why an application on the host cannot have its own process namespace; empty when it can."""
-    words = [PROGRAM, "--unshare-pid", "--dev-bind", "/", "/", "--proc", "/proc", "--", "true"]
-    for _ in range(MOST_TRIES):
-        try:
-            done = subprocess.run(
-                words, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, timeout=10
-            )
-        except (OSError, subprocess.TimeoutExpired) as error:
-            return str(error)
-        if not MOUNT_GONE.match(done.stderr):
-            break
-    return "" if done.returncode == 0 else done.stderr.strip() or f"exit code {done.returncode}"
+    seen = [word for path in ("/usr", *MERGED) for word in ("--ro-bind-try", path, path)]
+    words = [PROGRAM, "--unshare-pid", *([] if on_host else ["--unshare-net", "--unshare-ipc"]), *seen]
+    try:
+        seccomp_filter.program()
+        done = subprocess.run(
+            [*words, "--proc", "/proc", "--dev", "/dev", "--", "true"],
+            capture_output=True,
+            text=True,
+            check=False,
+            stdin=subprocess.DEVNULL,
+            timeout=10,
+        )
+    except FileNotFoundError:
+        return f"there is no program '{PROGRAM}': install bubblewrap"
+    except (OSError, subprocess.TimeoutExpired, NoSeccomp) as error:
+        return str(error)
+    if done.returncode == 0:
+        return ""
+    in_container = "allow this container to make namespaces (docker run --privileged, for example)"
+    remedy = "allow user namespaces" if os.getuid() else in_container
+    return f"the kernel refuses namespaces ({done.stderr.strip() or f'exit code {done.returncode}'}): {remedy}"
 
 
 def runs_alone(plan: Plan) -> bool:

@@ -45,7 +45,6 @@ from dodo_dsl.run.process.places import Places
 from dodo_dsl.run.process.seccomp_filter import NoSeccomp
 from dodo_dsl.run.process.slot import Entered
 
-HOST = "host"
 PERIOD_S = 0.25
 """Between two looks at the memory of the application's programs."""
 MAX_MESSAGE = 1 << 17
@@ -57,11 +56,10 @@ UMASK = 0o022
 class Sandbox:
     """The main loop of the sandbox's process."""
 
-    def __init__(self, channel: socket.socket, is_on_host: bool, forks: bool) -> None:
-        """``forks`` means that this process has loaded what services need."""
+    def __init__(self, channel: socket.socket, is_on_host: bool) -> None:
+        """One with own namespaces has loaded what services need."""
         self.channel = channel
         self.is_on_host = is_on_host
-        self.forks = forks
         umask = -1 if is_on_host else UMASK
         self.use = UseReader()
         self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), umask)
@@ -137,7 +135,7 @@ class Sandbox:
         output, file = descriptors
         command = json.loads(os.pread(file, os.fstat(file).st_size, 0))
         name, words, environment = command["id"], command["argv"], command["env"]
-        is_fork = self.forks and command["fork"] and not command["masked"]
+        is_fork = not self.is_on_host and command["fork"] and not command["masked"]
         start = self.children.fork if is_fork else functools.partial(self.children.start, masked=command["masked"])
         try:
             if command["confined"] is not None:
@@ -220,23 +218,22 @@ def _in_namespaces(channel: socket.socket, entered: Entered) -> None:
     os._exit(os.waitstatus_to_exitcode(status) & 0xFF)
 
 
-def main(argv: list[str]) -> int:
-    """``sandbox DESCRIPTOR host|ENTERED [--forks]``: serves the runner at the other end."""
-    channel = socket.socket(fileno=int(argv[0]))
-    is_on_host, outside = argv[1] == HOST, os.getpid()
+def serve(channel: socket.socket, entered: Entered | None) -> int:
+    """Serves the runner at the other end; ``entered`` is None on the host. The exit code of this process."""
+    outside = os.getpid()
     try:
-        if not is_on_host:
-            _in_namespaces(channel, Entered.of(argv[1]))
+        if entered:
+            _in_namespaces(channel, entered)
         else:
             namespaces.adopt_orphans()
     except OSError as error:
         channel.send(json.dumps({"down": str(error.strerror or error)}).encode())
         return 1
-    sandbox = Sandbox(channel, is_on_host, "--forks" in argv)
+    sandbox = Sandbox(channel, entered is None)
     sandbox.send(up=outside)
     sandbox.run()
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(serve(socket.socket(fileno=int(sys.argv[1])), None))

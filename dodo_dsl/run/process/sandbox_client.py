@@ -10,31 +10,28 @@ import socket
 import struct
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from dodo_dsl.run.process.environment import own_environment
-from dodo_dsl.run.process.fork_server_client import END_S, ForkServer
-from dodo_dsl.run.process.sandbox import HOST, MAX_MESSAGE
+from dodo_dsl.run.process.fork_server import ForkServer
+from dodo_dsl.run.process.sandbox import MAX_MESSAGE
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Entered, Slot, package_path
 from dodo_dsl.run.protocol import BackendError
 
 SEND_S = 10
+END_S = 10.0
+"""How long a sandbox that is about to end is waited for."""
 
 
 class SandboxClient:
-    """One sandbox; ``on_message`` gets its messages, ``on_lost`` the reason when it is out of reach.
-
-    It is forked by the ``fork_server``, or started as a process if there is none.
-    """
+    """One sandbox; ``on_message`` gets its messages, ``on_lost`` the reason when it is out of reach."""
 
     def __init__(
         self,
         on_message: Callable[[dict[str, Any]], None],
         on_lost: Callable[[str], None],
-        fork_server: ForkServer | None = None,
     ) -> None:
-        self._fork_server = fork_server
         self._on_message = on_message
         self._on_lost = on_lost
         self.pid: int | None = None
@@ -45,33 +42,24 @@ class SandboxClient:
         self._up: asyncio.Future[dict[str, Any]] | None = None
         self._closing = False
 
-    async def open(self, slot: Slot, log: int, entered: Entered | None = None) -> None:
+    async def open(
+        self, slot: Slot, log: int, server: ForkServer | None, entered: Entered, modules: Iterable[str] = ()
+    ) -> None:
         """Starts the sandbox, which logs to a descriptor and holds the slot's leases; raises BackendError.
 
-        ``entered`` are its namespaces; None on the host.
+        It is forked by a ``server`` that has loaded modules, and has ``entered`` its namespaces; on the host there is
+        none.
         """
-        answer = await self._start(slot, log, entered)
-        if "up" not in answer:
-            self._close_socket()
-            raise BackendError(f"the test's sandbox does not start: {answer['down']}")
-        self.pid = answer["up"]
-        with contextlib.suppress(ProcessLookupError):
-            self._end = os.pidfd_open(answer["up"])
-
-    async def _start(self, slot: Slot, log: int, entered: Entered | None) -> dict[str, Any]:
-        """The first message of a new sandbox, which a fork server forks, where there is one."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", SEND_S, 0))  # it may be busy
         self._socket, self._up = ours, asyncio.get_running_loop().create_future()
         asyncio.get_running_loop().add_reader(ours, self._receive)
         with theirs:
-            if entered and self._fork_server is not None:
-                with contextlib.suppress(OSError):
-                    self._fork_server.fork(theirs, log, slot.name, entered.word())
+            if server is not None:
+                server.fork(entered, modules, [theirs.fileno(), log, *slot.descriptors])
             else:
-                module = [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox"]
                 self._child = subprocess.Popen(
-                    [*module, str(theirs.fileno()), entered.word() if entered else HOST],
+                    [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox", str(theirs.fileno())],
                     pass_fds=(theirs.fileno(), *slot.descriptors),
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
@@ -79,7 +67,13 @@ class SandboxClient:
                     start_new_session=True,
                     env={**own_environment(), "PYTHONPATH": package_path(), SLOT_VARIABLE: slot.name},
                 )
-        return await self._up
+        answer = await self._up
+        if "up" not in answer:
+            self._close_socket()
+            raise BackendError(f"the test's sandbox does not start: {answer['down']}")
+        self.pid = answer["up"]
+        with contextlib.suppress(ProcessLookupError):
+            self._end = os.pidfd_open(answer["up"])
 
     def _close_socket(self) -> None:
         if self._socket is not None:

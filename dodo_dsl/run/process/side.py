@@ -4,8 +4,8 @@ import asyncio
 import contextlib
 import functools
 import os
-from collections.abc import Collection, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,20 +16,21 @@ from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.ros_topics import BRIDGE
 from dodo_dsl.opendlv.relay import BUS
 from dodo_dsl.plan.added_services import TIME
-from dodo_dsl.plan.model import LAYERS
+from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import application_time
 from dodo_dsl.run.application_files import application_paths
 from dodo_dsl.run.hidden_paths import hidden_paths, own_data
 from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import Send
-from dodo_dsl.run.process.commands import Command, Commands, needed_paths
+from dodo_dsl.run.process import host_isolation, leftovers
+from dodo_dsl.run.process.commands import Command, Commands, needed_paths, own_modules
 from dodo_dsl.run.process.confinement import MOST_TRIES, MOUNT_GONE, confinement
-from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process.fork_server import ForkServer
 from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
-from dodo_dsl.run.protocol import BackendError, Lost, Ready
+from dodo_dsl.run.protocol import BackendError, Lost, Ready, Say
 from dodo_dsl.run.service_output import ServiceOutput
-from dodo_dsl.run.sides import APPLICATION, WatchedServices
+from dodo_dsl.run.sides import APPLICATION, Side, WatchedServices
 
 LOG = "sandbox.log"
 _TIME_READY = b'{"dodo": "ready"}'
@@ -40,6 +41,60 @@ _NO_PROGRAM = "bwrap: execvp "
 """How bubblewrap says that it cannot start the application's program."""
 
 
+NOT_ROOT = (
+    "only root can enter the network of a test's containers: run as root, with --isolation host, or on another backend"
+)
+
+
+def may_enter() -> bool:
+    """Whether DoDo's processes can enter namespaces of containers."""
+    return os.geteuid() == 0
+
+
+@dataclass
+class Processes:
+    """Processes for the tests of a run; if it ``is_whole``, the application's services are among them.
+
+    ``fork_server`` is one that was started while tests were compiled.
+    """
+
+    isolation: str | None
+    fork_server: ForkServer | None
+    is_whole: bool
+    _problem: str = ""
+    _is_apart: bool = True
+
+    async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
+        for left in leftovers.reap():
+            note(f"removed what a killed run left: {left}")
+        forked = [plan for plan in plans if (self.isolation or plan.isolation) == "network"]
+        if forked and self.fork_server is None:
+            self.fork_server = ForkServer()
+        if not self.is_whole:
+            self._problem = "" if may_enter() else NOT_ROOT
+        elif forked and (why := await asyncio.to_thread(host_isolation.isolation_refusal)):
+            way_out = "an application that you trust runs with --isolation host"
+            self._problem = f"the application cannot be isolated on this machine: {why}; {way_out}"
+        elif len(forked) < len(plans) or any(plan.is_real for plan in plans):
+            why = await asyncio.to_thread(host_isolation.isolation_refusal, on_host=True)
+            self._is_apart = not why
+            if why:
+                note(f"what an application starts may outlive its test on the host: {why}")
+
+    def close(self) -> None:
+        if self.fork_server is not None:
+            self.fork_server.close()
+
+    def problem(self, _plan: Plan, isolation: str) -> str:
+        """Why a test cannot run here, in a sentence; empty if it can."""
+        return self._problem if isolation == "network" else ""
+
+    @contextlib.contextmanager
+    def side(self, watched: WatchedServices, slot: Slot, isolation: str, _say: Say) -> Iterator[Side]:
+        server = self.fork_server if isolation == "network" else None
+        yield ProcessSide(watched, slot, server, self._is_apart, self.is_whole)
+
+
 class ProcessSide:
     """One test's sandbox, and what runs in it."""
 
@@ -47,19 +102,18 @@ class ProcessSide:
         self,
         watched: WatchedServices,
         slot: Slot,
-        isolation: str,
-        fork_server: ForkServer | None = None,
-        is_apart: bool = True,
-        is_whole: bool = True,
+        fork_server: ForkServer | None,
+        is_apart: bool,
+        is_whole: bool,
     ) -> None:
-        """``is_apart`` means that on the host, too, the application gets its own process namespace.
+        """Without a ``fork_server`` it is on the host, where the application has its own processes if it ``is_apart``.
 
         If it ``is_whole``, the application's services run here.
         """
         self._watched = watched
         self._plan, self._folder, self._report = watched.plan, watched.folder, watched.report
         self._slot = slot
-        self._is_on_host, self._is_apart = isolation == "host", is_apart
+        self._fork_server, self._is_on_host, self._is_apart = fork_server, fork_server is None, is_apart
         self._gives_time, self._has_time = is_whole and self._plan.lockstep is not None, False
         self._commands = Commands(self._plan, self._folder, self._report, slot)
         self._starts: dict[str, list[Command]] = {}
@@ -67,16 +121,16 @@ class ProcessSide:
         self._exits: list[asyncio.Future[None]] = []
         self._asked: dict[str, asyncio.Future[Any]] = {}
         """What the sandbox is to answer, by what it is asked to do."""
-        self._sandbox = SandboxClient(self._take, lambda why: watched.tell(Lost(why)), fork_server)
+        self._sandbox = SandboxClient(self._take, lambda why: watched.tell(Lost(why)))
 
     async def open(self, entered: int = 0) -> int:
         needed = [*needed_paths(self._plan, self._folder, self._report), Path(self._slot.channel)]
         if self._gives_time:
             needed += await self._open_time()
         self._commands = replace(self._commands, by_answers=self._watched.by_answers)
-        namespaces = None if self._is_on_host else Entered.with_own(entered, *needed)
+        namespaces, modules = Entered.with_own(entered, *needed), own_modules([self._plan])
         with atomic.appended(self._report / LOG) as log:
-            await self._sandbox.open(self._slot, log.fileno(), namespaces)
+            await self._sandbox.open(self._slot, log.fileno(), self._fork_server, namespaces, modules)
         self._watched.reports.listen(Path(self._slot.channel))
         return 0
 

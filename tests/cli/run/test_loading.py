@@ -1,4 +1,4 @@
-"""A fork server that was started early belongs to the backend that took it; one that nobody took is ended at once."""
+"""A fork server that was started early ends with its command."""
 
 import argparse
 import contextlib
@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.cli.loading import begin, loading
-from dodo_dsl.run.process import fork_server_client
-from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process import fork_server
+from dodo_dsl.run.process.fork_server import ForkServer
 from tests.run.desk import ROOT
 
 
@@ -31,23 +31,17 @@ def started(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[ForkServer]]:
         start(self)
         servers.append(self)
 
-    monkeypatch.setattr(fork_server_client.ForkServer, "__init__", remembered)
+    monkeypatch.setattr(fork_server.ForkServer, "__init__", remembered)
     yield servers
     for server in servers:
-        server.kill()
+        server.close()
 
 
-def test_one_that_has_begun_is_taken(started: list[ForkServer]) -> None:
+def test_one_that_has_begun_is_taken_and_ends(started: list[ForkServer]) -> None:
     begin(["sil-closed-straight"])
-    with loading(options(), 0) as load:
-        assert started == [load.fork_server]
-
-
-def test_one_that_has_begun_in_vain_ends(started: list[ForkServer]) -> None:
-    begin(["sil-closed-straight", "--iso=host"])  # argparse takes it
-    with loading(options(isolation="host"), 0) as load:
-        assert load.take() is None
-    assert [server.is_alive for server in started] == [False]
+    with loading(options()) as server:
+        assert started == [server]
+    assert started[0]._process.poll() is not None
 
 
 @pytest.mark.parametrize("words", [["--help"], ["--backend", "docker"], ["--isolation=host"]])
