@@ -26,7 +26,7 @@ CID, RUN, PROJECT = "cid-", "run-", "docker-"
 _LOCKS = Path("/run/lock")
 _MODE = 0o660
 _RETRY_S = 0.2
-_ENDING, _LOCK = ".lease", "leases.lock"
+_ENDING = ".lease"
 _MOST_BYTES = 1 << 16
 
 
@@ -45,7 +45,7 @@ class Lease:
 
     def release(self) -> None:
         """Gives up this process's hold, and leaves nothing to be removed."""
-        with contextlib.suppress(OSError), _alone(self.record.parent):  # the next run removes the rest
+        with contextlib.suppress(OSError):  # the next run removes the rest
             fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)  # nobody shares it
             self.record.unlink(missing_ok=True)
         os.close(self.descriptor)
@@ -69,42 +69,27 @@ def lease_folder() -> Path:
     return secured(above / own)
 
 
-@contextlib.contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Nobody else locks or removes a lease in the folder meanwhile; not to be nested."""
-    descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, _MODE)
-    try:
-        _share(descriptor, folder)
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)
-
-
-def _share(descriptor: int, folder: Path) -> None:
-    """All users of the folder can read and write a file, whatever the umask is."""
-    with contextlib.suppress(OSError):  # of another user, or of a group that this one is not in
-        os.fchmod(descriptor, _MODE)
-        os.fchown(descriptor, -1, folder.stat().st_gid)
-
-
 def _locked(path: Path, kind: int, *, is_made: bool) -> int | None:
     """The locked descriptor of a file that is there, or else made; None if it is held, or another user's alone."""
     flags = os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC | (os.O_CREAT if is_made else 0)
-    try:
-        descriptor = os.open(path, flags, _MODE)
-    except PermissionError:
-        return None
-    try:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise OSError(errno.EINVAL, "expected a file", str(path))  # noqa: TRY301
-        fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
-    except OSError as error:
-        os.close(descriptor)
-        if isinstance(error, BlockingIOError):
+    while True:
+        try:
+            descriptor = os.open(path, flags, _MODE)
+        except PermissionError:
             return None
-        raise
-    return descriptor
+        try:
+            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+                raise OSError(errno.EINVAL, "expected a file", str(path))  # noqa: TRY301
+            fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
+            if path.exists() and os.path.samestat(os.fstat(descriptor), path.stat()):
+                return descriptor
+        except BlockingIOError:
+            os.close(descriptor)
+            return None
+        except OSError:
+            os.close(descriptor)
+            raise
+        os.close(descriptor)  # its holder has removed it meanwhile
 
 
 def _said(descriptor: int) -> dict[str, Any]:
@@ -118,13 +103,14 @@ def _said(descriptor: int) -> dict[str, Any]:
 def try_lease(name: str, about: dict[str, Any], shared: bool = False) -> Lease | None:
     """The lease when nobody has it, else None. Shared leases exclude only exclusive ones."""
     path = lease_folder() / f"{name}{_ENDING}"
-    with _alone(path.parent):
-        descriptor = _locked(path, fcntl.LOCK_SH if shared else fcntl.LOCK_EX, is_made=True)
+    descriptor = _locked(path, fcntl.LOCK_SH if shared else fcntl.LOCK_EX, is_made=True)
     if descriptor is None:
         return None
     lease = Lease(name, descriptor, path, _said(descriptor))
     try:
-        _share(descriptor, path.parent)
+        with contextlib.suppress(OSError):  # of another user, or of a group that this one is not in
+            os.fchmod(descriptor, _MODE)  # whatever the umask is
+            os.fchown(descriptor, -1, path.parent.stat().st_gid)
         os.ftruncate(descriptor, 0)
         os.pwrite(descriptor, json.dumps({"pid": os.getpid(), **about}).encode(), 0)
     except OSError:
@@ -137,10 +123,9 @@ def holder(name: str) -> str:
     """The holder of a lease, for a message; empty if nobody holds it."""
     path = lease_folder() / f"{name}{_ENDING}"
     with contextlib.suppress(OSError):
-        with _alone(path.parent):
-            if (descriptor := _locked(path, fcntl.LOCK_EX, is_made=False)) is not None:
-                os.close(descriptor)
-                return ""
+        if (descriptor := _locked(path, fcntl.LOCK_EX, is_made=False)) is not None:
+            os.close(descriptor)
+            return ""
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
         about = _said(descriptor)
         os.close(descriptor)
@@ -180,8 +165,7 @@ def orphans(prefix: str) -> Iterator[Lease]:
     """This user's leases whose holders have ended and may have left something; each is yielded held."""
     for path in sorted(lease_folder().glob(f"{prefix}*{_ENDING}")):
         with contextlib.suppress(OSError):
-            with _alone(path.parent):
-                descriptor = _locked(path, fcntl.LOCK_EX, is_made=False)
+            descriptor = _locked(path, fcntl.LOCK_EX, is_made=False)
             if descriptor is not None and os.fstat(descriptor).st_uid == os.getuid():
                 yield Lease(path.name.removesuffix(_ENDING), descriptor, path, _said(descriptor))
             elif descriptor is not None:

@@ -28,7 +28,7 @@ def test_both_sides_of_a_verdict(crate: Crate, tmp_path: Path, monkeypatch: pyte
         for name, value in proxy.variables.items():
             patch.setenv(name, value)
         (found,) = capabilities.docker_engine()
-        assert (found.text.endswith(" with TLS"), proxy.variables["DOCKER_HOST"] in found.text) == (True, True)
+        assert proxy.variables["DOCKER_HOST"] in found.text
         outcomes = crate.run(*jobs)
         assert crate.left() == []
     assert [outcomes[name].outcome for name in names] == ["passed", "failed"], outcomes
@@ -38,10 +38,10 @@ MOUNT = 'mount -t tmpfs none "$0"; cp -a "$1" "$0/far"; shift; exec "$@"'
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts")
-def test_a_test_ends_before_anything_is_pulled(crate: Crate) -> None:
+def test_what_the_engine_does_not_see_is_named(crate: Crate) -> None:
     """What the application mounts is itself on a mount that only DoDo has."""
     folder = crate.bench.folder / "own"
-    job = crate.job("far", image="127.0.0.1:9/dodo-no-such-image:1", volumes=[f"{folder}/far:/own:ro"])
+    job = crate.job("far", volumes=[f"{folder}/far:/own:ro"])
     folder.mkdir()
     mounted = ["unshare", "--mount", "--propagation", "private", "sh", "-ec", MOUNT, str(folder), str(job.folder)]
     run = ["-m", "dodo_dsl", "run", "--backend", "docker", "--report", str(job.report), "--compiled", str(job.folder)]

@@ -4,7 +4,9 @@ Both share a network, an IPC namespace and ``/tmp``. A container holds these: it
 image.
 """
 
+import io
 import secrets
+import tarfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,18 +16,36 @@ from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import TIME
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import application_time
+from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.docker.container_use import ELSEWHERE, first_process
 from dodo_dsl.run.docker.mounts import over
-from dodo_dsl.run.docker.shared_files import IMAGE
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.slot import Entered
 from dodo_dsl.run.protocol import BackendError
 
+IMAGE = "dodo-empty:1"
+"""Made on the engine where it is missing; it has no files."""
 _SEEN = ("/bin", "/lib", "/lib64", "/usr")
 """Folders of this machine that hold the program and its libraries."""
 _TMP = "tmp"
 _NOBODY = "containers-of-dodo"
 """A profile that compose is not asked for."""
+
+
+def provide_image(client: Any) -> None:
+    """Makes the empty image, unless the engine has it; raises BackendError."""
+    from docker.errors import DockerException, ImageNotFound
+
+    try:
+        try:
+            client.api.inspect_image(IMAGE)
+        except ImageNotFound:
+            empty = io.BytesIO()
+            tarfile.open(fileobj=empty, mode="w").close()
+            repository, tag = IMAGE.split(":")
+            client.api.import_image_from_data(empty.getvalue(), repository=repository, tag=tag)
+    except (DockerException, OSError) as error:
+        raise BackendError(f"the Docker engine cannot make an empty image: {engine_error(error)}") from error
 
 
 def without_own(made: dict[str, Any], plan: Plan, needed: Iterable[Path]) -> dict[str, Any]:

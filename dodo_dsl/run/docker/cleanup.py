@@ -1,68 +1,29 @@
 """The end of compose projects on an engine: stopped, reports copied, removed; also those that killed runs left.
 
-Projects are known by their label. Files are copied out of a container from the stream that the engine sends, with one
-chunk at a time in memory.
+Projects are known by their label.
 """
 
 import contextlib
-import errno
-import functools
-import shutil
-import tarfile
+import os
+import subprocess
+import tempfile
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl import atomic
+from dodo_dsl.application import secret_variables
 from dodo_dsl.emit.compose import REPORT
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.docker.client import engine_error
 
-_CHUNK = 1 << 16
-
-
-def copy_out(container: Any, folder: str, target: Path) -> None:
-    """Copies the regular files of a container's folder by their last name; links are skipped.
-
-    Each file is complete or absent. Raises OSError when the disk is full, or the stream is damaged.
-    """
-    chunks, _ = container.get_archive(folder, chunk_size=_CHUNK)
-    stream: Any = _Stream(chunks)
-    try:
-        with tarfile.open(fileobj=stream, mode="r|") as tar:
-            for member in tar:
-                name = Path(member.name).name
-                if member.isfile() and name not in ("", ".", "..") and (content := tar.extractfile(member)):
-                    with atomic.replacing(target / name) as part, part.open("xb") as file:
-                        shutil.copyfileobj(content, file)
-        for _ in chunks:  # of padding: a stream that is read to its end gives its connection back
-            pass
-    except tarfile.TarError as error:
-        raise OSError(errno.EIO, f"the archive from the engine is damaged ({error})") from error
-
-
-class _Stream:
-    """Chunks of bytes as a file that can be read once."""
-
-    def __init__(self, chunks: Iterable[bytes]) -> None:
-        self._chunks, self._rest = iter(chunks), b""
-
-    def read(self, size: int) -> bytes:
-        while len(self._rest) < size and (chunk := next(self._chunks, b"")):
-            self._rest += chunk
-        data, self._rest = self._rest[:size], self._rest[size:]
-        return data
-
-
 PROJECT_LABEL = "com.docker.compose.project"
 SERVICE_LABEL = "com.docker.compose.service"
 _STOP_S = 2
-_WITHOUT_CONTAINER = "ep-"
-"""How an engine lists an endpoint whose container is gone, or never started."""
 _RESTS_S = 0.5, 1.0, 2.0
 """Waits before removing once more what the engine refuses to: it may still be busy with a container that has ended."""
 
@@ -95,14 +56,12 @@ def remove_project(client: Any, project: str, rests_s: Sequence[float] = _RESTS_
     """Removes containers, networks and volumes of a project and returns their number, without those already removed.
 
     Goes on when one cannot be removed, tries it again after each of ``rests_s``, and raises the first such error at the
-    end.
+    end; raises OSError at once.
     """
-    from docker.errors import APIError, DockerException, NotFound
+    from docker.errors import APIError, NotFound
 
     removed, problem = 0, None
     for rest_s in (0.0, *rests_s):
-        if problem is not None and not isinstance(problem, APIError):
-            break
         time.sleep(rest_s)
         problem = None
         for remove in _removals(client, project):
@@ -111,27 +70,28 @@ def remove_project(client: Any, project: str, rests_s: Sequence[float] = _RESTS_
                 removed += 1
             except NotFound:
                 continue
-            except (DockerException, OSError) as error:
+            except APIError as error:
                 problem = problem or error
         if problem is None:
             return removed
-    raise problem or OSError("nothing was tried")
+    assert problem is not None
+    raise problem
 
 
 def _removals(client: Any, project: str) -> Iterator[Callable[[], None]]:
     """Containers come first: networks and volumes can only be removed when no container uses them."""
     for container in client.containers.list(all=True, filters=_filters(project)):
-        yield functools.partial(container.remove, force=True, v=True)
+        yield partial(container.remove, force=True, v=True)
     for network in client.networks.list(filters=_filters(project)):
-        yield functools.partial(_remove_network, network)
+        yield partial(_remove_network, network)
     yield from (volume.remove for volume in client.volumes.list(filters=_filters(project)))
 
 
 def _remove_network(network: Any) -> None:
-    """Removes a network, also where an endpoint is left of a container that could not start."""
+    """Removes a network, also where an endpoint is left of a container that is gone, or never started."""
     network.reload()
     for key, about in (network.attrs.get("Containers") or {}).items():
-        if key.startswith(_WITHOUT_CONTAINER):
+        if key.startswith("ep-"):
             network.disconnect(about["Name"], force=True)
     network.remove()
 
@@ -178,7 +138,7 @@ def take_down(
         stop_project(client, project)
         for name in report[0]:
             if name in containers:
-                _copy_report(containers[name], name, report[1], note)
+                _copy_report(containers[name].id, name, report[1], note)
         remove_project(client, project)
     except Exception as error:  # noqa: BLE001  (whatever it was, the record of the project has to stay)
         reason = engine_error(error)
@@ -187,10 +147,18 @@ def take_down(
     return True
 
 
-def _copy_report(container: Any, name: str, folder: Path, note: Callable[[str], None]) -> None:
-    from docker.errors import DockerException
-
+def _copy_report(container: str, name: str, folder: Path, note: Callable[[str], None]) -> None:
+    """Copies the regular files of a container's report, all of them or none."""
     try:
-        copy_out(container, f"{REPORT}/.", folder)
-    except (DockerException, OSError) as error:
-        note(f"the report misses files of {name}: {engine_error(error)}")
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".copy-", dir=folder) as copy:
+            words = ["docker", "cp", f"{container}:{REPORT}/.", copy]
+            own = secret_variables.of_client(os.environ)
+            subprocess.run(words, env=own, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=True)
+            for path in Path(copy).iterdir():
+                if path.is_file() and not path.is_symlink():
+                    path.replace(folder / path.name)
+    except subprocess.CalledProcessError as error:
+        note(f"the report misses files of {name}: {error.stderr.strip()}")
+    except OSError as error:
+        note(f"the report misses files of {name}: {error.strerror}")

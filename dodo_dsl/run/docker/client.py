@@ -1,13 +1,13 @@
-"""The client of a Docker engine, and the texts of the engine's errors."""
+"""The client of a Docker engine, the docker command, and the texts of the engine's errors."""
 
+import asyncio
 import contextlib
-import re
 import tarfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl import advice
+from dodo_dsl import advice, atomic
 from dodo_dsl.run import application_time
 from dodo_dsl.run.protocol import BackendError
 
@@ -15,8 +15,7 @@ _CONNECTIONS = 200
 _MOST_LINKS, _HEAD_SIZE = 10, 1 << 13
 _IS_FOLDER, _CHANGES_USER = 1 << 31, 1 << 23 | 1 << 22
 """Modes as Go has them (fs.FileMode), in which the engine says them."""
-TOO_SLOW = re.compile("failed to create shim.*context deadline exceeded")
-"""In the error of an engine that was too busy to start a container, whatever that is; it may try again."""
+_YIELDING = ("nice", "-n", "10")  # set-up must not slow down tests that already run
 
 
 class NoEngine(BackendError):
@@ -113,3 +112,24 @@ def refusal(
 def engine_error(error: Exception) -> str:
     """The engine's explanation of an error without the client's text around it, or the system's."""
     return str(getattr(error, "explanation", None) or getattr(error, "strerror", None) or error)
+
+
+async def run(
+    words: Sequence[str], folder: Path, environment: Mapping[str, str], log: Path | None = None
+) -> tuple[int, str]:
+    """Exit code and the last line of standard error of a docker command, which ends when this is cancelled."""
+    process = await asyncio.create_subprocess_exec(
+        *_YIELDING, "docker", *words, cwd=folder, env=environment, stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
+    )  # fmt: skip
+    try:
+        out, err = await process.communicate()
+    except asyncio.CancelledError:
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
+        await process.wait()
+        raise
+    if log is not None:
+        atomic.write_bytes(log, out + err)
+    errors = [line for line in err.decode("utf-8", "replace").splitlines() if line.strip()]
+    return process.returncode or 0, errors[-1].strip() if errors else ""

@@ -5,7 +5,6 @@ what their mounts would show of the tests. An error message about a service lead
 """
 
 import asyncio
-import contextlib
 import json
 import os
 import re
@@ -16,20 +15,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl import advice, atomic
+from dodo_dsl import advice
 from dodo_dsl.application import secret_variables
 from dodo_dsl.application.host_paths import is_port
 from dodo_dsl.application.interpolation import EnvironmentProblem, escaped, interpolate
 from dodo_dsl.application.model import FILES
 from dodo_dsl.emit.compose import CHANNEL
-from dodo_dsl.emit.render import PLAN_FILE
 from dodo_dsl.plan.added_services import ANSWERS_VARIABLE, RUNNER_VARIABLE, without_time
 from dodo_dsl.plan.model import LAYERS, Application, Plan
 from dodo_dsl.run.application_files import application_paths, variables_of
 from dodo_dsl.run.docker.beside_processes import without_own
 from dodo_dsl.run.docker.builds import HiddenContext, is_built, own_contexts, private_images
+from dodo_dsl.run.docker.client import run
 from dodo_dsl.run.docker.mounts import Bind, absent, binds, long_form, masks, over, whole
-from dodo_dsl.run.docker.pulls import Pulls, image_hints
+from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.hidden_paths import hidden_paths
 from dodo_dsl.run.process.commands import needed_paths
 from dodo_dsl.run.protocol import BackendError, Say
@@ -59,7 +58,11 @@ _NO_YAML = re.compile(r"[\x7f-\xa0\u2028\u2029\ud800-\udfff\ufeff\ufffe\uffff]")
 _EMPTY_FILE = ".hidden"
 _BUILD_PROJECT = "dodo-build"
 _OVERLAP = "overlaps"
-_YIELDING = ("nice", "-n", "10")  # set-up must not slow down tests that already run
+_UNSEEN = re.compile("bind source path does not exist: (.*)")
+_SHARED = (
+    "work in a folder that it has, and set TMPDIR to one, at the same path; "
+    "in Docker-in-Docker on GitLab, it has what is below /builds"
+)
 
 
 _LAYERS = tuple(layer for layer in LAYERS if layer != APPLICATION)
@@ -138,13 +141,6 @@ class Compose:
     def _hidden(self) -> list[Path]:
         return hidden_paths(self.plan.application, self.folder, self.report)
 
-    def mounted(self) -> list[Path]:
-        """What containers mount of this machine; what is compiled stands as one file."""
-        sources = {Path(bind.source) for each in self._binds.values() for bind in each}
-        reads_files = self.plan.messages or any(f.kind == "path" for s in self.plan.services for f in s.flags)
-        own = [self.folder / PLAN_FILE] if self.is_whole and reads_files else []
-        return [*own, *sorted(path for path in sources if path.exists())]
-
     def has_healthcheck(self, name: str) -> bool:
         """Whether the compose file has one for a service of the application."""
         check = self.services.get(name, {}).get("healthcheck")
@@ -154,12 +150,7 @@ class Compose:
         """Pulls and builds the services' images, once for all tests of a run; raises BackendError."""
         private = private_images(self.services, self._paths.folder, self._outside)
         foreign = {service["image"] for name, service in self.services.items() if name not in private}
-        ways = {
-            self.services[s.name]["image"]: f"with 'x-dodo-process: [python, main.py]' '{s.name}' starts as a process"
-            for s in self.plan.application.services
-            if s.name in self.services and not s.process
-        }
-        for note in await pulls.provide(self._own_images(), foreign, self.say, ways | image_hints(self.plan)):
+        for note in await pulls.provide(self.plan, self._own_images(), foreign, self.say):
             self.say(note)
         for name, image in private.items():
             self.services[name]["image"] = image
@@ -209,6 +200,8 @@ class Compose:
                 if not code or _OVERLAP not in problem:
                     break
         if code:
+            if unseen := _UNSEEN.search(problem):
+                raise BackendError(f"the Docker engine does not see '{unseen[1]}' of this machine: {_SHARED}")
             raise BackendError(f"docker compose cannot create the test: {traced(self.plan, problem)}")
 
     def document(self) -> dict[str, Any]:
@@ -247,19 +240,4 @@ class Compose:
         if subnet:
             environment["DODO_SUBNET"] = subnet
         named = [word for file in files for word in ("--file", file)]
-        process = await asyncio.create_subprocess_exec(
-            *_YIELDING, "docker", "compose", "--project-directory", ".", *named, *words, cwd=self.folder,
-            env=environment, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-        )  # fmt: skip
-        try:
-            out, err = await process.communicate()
-        except asyncio.CancelledError:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()
-            raise
-        if log is not None:
-            atomic.write_bytes(log, out + err)
-        errors = [line for line in err.decode("utf-8", "replace").splitlines() if line.strip()]
-        return process.returncode or 0, errors[-1].strip() if errors else ""
+        return await run(["compose", "--project-directory", ".", *named, *words], self.folder, environment, log)

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import signal
 import threading
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,12 @@ from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import RECORDER
 from dodo_dsl.plan.model import HEALTHY
 from dodo_dsl.run.application_time import PAGE_DESTROYED, POSIX_MEMORY
-from dodo_dsl.run.docker import beside_processes, shared_files
+from dodo_dsl.run.docker import beside_processes
+from dodo_dsl.run.docker.beside_processes import IMAGE
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down, writers
-from dodo_dsl.run.docker.client import TOO_SLOW, engine_error, refusal
+from dodo_dsl.run.docker.client import engine_error, refusal
 from dodo_dsl.run.docker.compose import Compose
-from dodo_dsl.run.docker.container_use import ELSEWHERE, ContainerUse
+from dodo_dsl.run.docker.container_use import ContainerUse
 from dodo_dsl.run.docker.events import EventWatch
 from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, close, copy_into, type_into
 from dodo_dsl.run.docker.pulls import Pulls
@@ -33,8 +34,6 @@ _MEMORY_S = 1.0
 """How long the engine's word is awaited that it was for memory: it may come late."""
 _COPY_S = 600.0
 """The longest that copies of the repository's files may take."""
-_HOST_TURNS, _HOST_TURN_S = 20, 0.05
-"""How often, and how long each time, a container's process is looked for on this machine."""
 _OUTPUT_S = 2.0
 
 
@@ -71,9 +70,10 @@ class ContainerSide:
             self._watched.await_answers("containers on the host's network cannot have the test's time")
         await asyncio.to_thread(self._compose.read)
         await self._pulls.once("docker compose", self._compose.require_plugin)
-        await self._require_files()
-        await self._open_channel()
+        self._open_channel()
         await self._compose.provide_images(self._pulls)
+        if not self._compose.is_whole:
+            await self._pulls.once(IMAGE, partial(asyncio.to_thread, beside_processes.provide_image, self._client))
         await self._look_at_programs()
         await self._compose.create(self._subnets)
         await self._start_watching()
@@ -81,31 +81,12 @@ class ContainerSide:
             return 0
         return await asyncio.to_thread(beside_processes.entered, self._containers, self._application)
 
-    async def _require_files(self) -> None:
-        """Raises BackendError where the engine does not see what the test mounts; once for all tests of a run."""
-        await self._pulls.once(shared_files.IMAGE, lambda: asyncio.to_thread(shared_files.provide_image, self._client))
-        paths = self._compose.mounted()
-        others = [str(path) for path in paths if not path.is_relative_to(self._watched.folder)]
-        await self._pulls.once(f"files {self._watched.folder.parent} {others}", lambda: self._look_for(paths))
-
-    async def _open_channel(self) -> None:
-        """Listens to services; where the engine does not see the folder, they meet in a volume, and print."""
-        folder = Path(self._compose.channel)
-        if not self._compose.is_whole or not self._compose.channel:  # DoDo's services are processes, or meet apart
-            return
-        try:
-            if not self._is_on_host:
-                await self._pulls.once(f"folder {folder.parent}", lambda: self._look_for([folder]))
-            self._watched.reports.listen(folder)
-        except BackendError:
-            self._compose.channel = ""
-        except OSError as error:
-            raise BackendError(f"services cannot reach the runner: {error}") from error
-
-    async def _look_for(self, paths: Sequence[Path]) -> None:
-        missing = await asyncio.to_thread(shared_files.unseen, self._client, paths, self._compose.project)
-        if missing:
-            raise BackendError(": ".join(shared_files.problem(missing)))
+    def _open_channel(self) -> None:
+        if self._compose.is_whole and self._compose.channel:  # else DoDo's services are processes, or meet apart
+            try:
+                self._watched.reports.listen(Path(self._compose.channel))
+            except OSError as error:
+                raise BackendError(f"services cannot reach the runner: {error}") from error
 
     async def _look_at_programs(self) -> None:
         """In lockstep by answers, where a program of the application cannot have the test's time."""
@@ -230,10 +211,7 @@ class ContainerSide:
         async def start(name: str) -> None:
             await self._start(layer, name)
 
-        started = await self._watched.start(names, start, reports)
-        if layer == APPLICATION:
-            await self._require_here()
-        return started
+        return await self._watched.start(names, start, reports)
 
     async def connect(self) -> Send:
         from docker.errors import DockerException
@@ -271,34 +249,20 @@ class ContainerSide:
         if why and name not in self._watched.may_be_ill:
             self._watched.tell(Unstartable(name, why))
 
-    def _start_container(self, name: str, again: bool = False) -> Any:
-        """Starts a container, if need be twice; what it prints."""
-        from docker.errors import APIError
+    def _start_container(self, name: str) -> Any:
+        """Starts a container; what it prints."""
+        from docker.errors import DockerException
 
         printed = attached(self._containers[name])  # before its start, because it may end at once
         try:
             self._containers[name].start()
-        except APIError as error:
+        except (DockerException, OSError):
             close(printed)
-            if again or not TOO_SLOW.search(engine_error(error)):
-                raise
-            self._note(f"the container of '{name}' is started once more: {engine_error(error)}")
-            return self._start_container(name, again=True)
+            raise
         return printed
 
     async def listeners(self) -> Collection[str] | None:
         return await asyncio.to_thread(self._use.listeners, self._application, self._plan.cid)
-
-    async def _require_here(self) -> None:
-        """Raises BackendError on the network of a host that is not this machine.
-
-        The engine shows a service that has just ended as a process that is not here, so it is asked again.
-        """
-        for _ in range(_HOST_TURNS):
-            if not self._is_on_host or await self.application() is not None:
-                return
-            await asyncio.sleep(_HOST_TURN_S)
-        raise BackendError(f"{ELSEWHERE}, on whose network DoDo cannot begin the test; use --isolation network")
 
     async def use(self) -> Snapshot | None:
         return await asyncio.to_thread(self._use.take)

@@ -1,4 +1,4 @@
-"""The processes of a sandbox: started or forked, collected when they end, and ended with all their descendants.
+"""The processes of a sandbox: forked, started or confined, collected when they end, and ended with all descendants.
 
 A Python module that is forked instead of started has what its parent has loaded already.
 """
@@ -18,28 +18,26 @@ from pathlib import Path
 from typing import NoReturn
 
 from dodo_dsl.run.machine_load.processes import above, living, owners
-from dodo_dsl.run.process import namespaces
-from dodo_dsl.run.process.confined_process import ConfinedProcess
+from dodo_dsl.run.process import confined_process, namespaces
 from dodo_dsl.run.process.confinement import Confinement
 from dodo_dsl.run.process.places import Places
 
+GRACE_S = 3.0
+_POLL_S = 0.05
+_KILL_TRIES, _KILL_S = 100, 0.01
 _DESCRIPTORS = 65_536
 
 
-class ForkedModule:
-    """A child of this process, which has one thread; ``pid`` is that of its own session."""
+def _forked(words: Sequence[str], environment: Mapping[str, str], folder: str, output: int) -> int:
+    """The process id of a child of this process, which has one thread, in a session of its own.
 
-    def __init__(self, words: Sequence[str], environment: Mapping[str, str], folder: str, output: int) -> None:
-        """``words`` are ``python -m MODULE`` and its arguments; raises OSError when the folder cannot be entered."""
-        Path(folder).stat()
-        sys.stderr.flush()
-        self.pid = os.fork()
-        if self.pid == 0:
-            _become(words, environment, folder, output)
-
-    def wait(self) -> int:
-        """Its exit code, below 0 for the signal that ended it, as in subprocess."""
-        return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+    ``words`` are ``python -m MODULE`` and its arguments; raises OSError when the folder cannot be entered.
+    """
+    Path(folder).stat()
+    sys.stderr.flush()
+    if (pid := os.fork()) == 0:
+        _become(words, environment, folder, output)
+    return pid
 
 
 def _become(words: Sequence[str], environment: Mapping[str, str], folder: str, output: int) -> NoReturn:
@@ -50,7 +48,9 @@ def _become(words: Sequence[str], environment: Mapping[str, str], folder: str, o
         runpy.run_module(words[2], run_name="__main__", alter_sys=True)
         code = 0
     except SystemExit as end:
-        code = _exit_code(end)
+        code = end.code if isinstance(end.code, int) else 0 if end.code is None else 1
+        if code and not isinstance(end.code, int):
+            print(end.code, file=sys.stderr)
     except BaseException:  # noqa: BLE001  (it is printed as Python does)
         traceback.print_exc()
     finally:
@@ -78,52 +78,38 @@ def _set_up(environment: Mapping[str, str], folder: str, output: int) -> None:
     sys.stderr = open(2, "w", buffering=1, closefd=False)  # noqa: SIM115
 
 
-def _exit_code(end: SystemExit) -> int:
-    if end.code is None:
-        return 0
-    if isinstance(end.code, int):
-        return end.code
-    print(end.code, file=sys.stderr)
-    return 1
-
-
-GRACE_S = 3.0
-_POLL_S = 0.05
-_KILL_TRIES, _KILL_S = 100, 0.01
-
-
-Child = subprocess.Popen[bytes] | ForkedModule | ConfinedProcess
-
-
-@dataclass(frozen=True)
-class ChildExit:
-    """How a child ended: ``code`` below 0 for a signal; ``used`` bytes of memory where that was more than allowed.
-
-    ``failed`` means that it never began, because its sandbox could not be set up.
-    """
-
-    code: int
+@dataclass
+class _Child:
+    name: str
+    process: subprocess.Popen[bytes] | None = None
+    status: int = -1
+    """What bubblewrap says of an application's program; -1 for others."""
+    memory: int = 0
+    """Bytes that it may use at most, 0 for no limit."""
     used: int = 0
-    failed: bool = False
+    """Bytes for which it was ended."""
 
 
 class Children:
-    """Children of this process by name; ``on_exit`` is called with the name of each that ended, and how."""
+    """Children of this process; ``on_exit`` is called for each that ended.
 
-    def __init__(self, on_exit: Callable[[str, ChildExit], None], umask: int = -1) -> None:
+    It gets the name, the exit code, below 0 for a signal, the bytes of memory where those were more than allowed, and
+    whether it never began, because its sandbox could not be set up.
+    """
+
+    def __init__(self, on_exit: Callable[[str, int, int, bool], None], umask: int = -1) -> None:
         """``umask`` is that of programs that are started, by default this process's."""
         self._on_exit = on_exit
         self._umask = umask
-        self._running: dict[str, Child] = {}
-        self._used: dict[str, int] = {}
-        self.limits: dict[str, int] = {}
-        """Bytes of memory that the application's programs may use."""
+        self._running: dict[int, _Child] = {}
         self.names: dict[int, str] = {}
         """All that were ever started, by process id."""
+        self.application: dict[int, str] = {}
+        """The application's among them."""
 
     def fork(self, name: str, words: Sequence[str], environment: dict[str, str], folder: str, output: int) -> int:
         """Forks this process for a Python module, and gives the process id; raises OSError."""
-        return self._add(name, ForkedModule(words, environment, folder, output))
+        return self._add(_forked(words, environment, folder, output), _Child(name))
 
     def start(
         self,
@@ -138,7 +124,7 @@ class Children:
 
         Raises OSError, SubprocessError and ValueError.
         """
-        child = subprocess.Popen(
+        process = subprocess.Popen(
             words,
             env=environment,
             cwd=folder,
@@ -149,7 +135,7 @@ class Children:
             umask=self._umask,
             preexec_fn=functools.partial(_begin, os.getpid(), masked),  # noqa: PLW1509  (it has one thread)
         )
-        return self._add(name, child)
+        return self._add(process.pid, _Child(name, process))
 
     def confine(
         self,
@@ -161,40 +147,35 @@ class Children:
         places: Places | None,
     ) -> int:
         """Starts a program of the application; raises as ``start``, and NoSeccomp."""
-        child = ConfinedProcess(words, environment, output, confined, places, self._umask)
-        self.limits[name] = confined.limits.memory
-        return self._add(name, child)
+        process, status = confined_process.start(words, environment, output, confined, places, self._umask)
+        self.application[process.pid] = name
+        return self._add(process.pid, _Child(name, process, status, confined.limits.memory))
 
-    @property
-    def are_watched(self) -> bool:
-        """Whether any has a limit of memory."""
-        return not self.limits.keys().isdisjoint(self._running)
+    def _add(self, pid: int, child: _Child) -> int:
+        self._running[pid] = child
+        self.names[pid] = child.name
+        return pid
 
     def watch_memory(self) -> None:
         """Ends those that use more memory than they may."""
-        limits = {name: most for name, most in self.limits.items() if name in self._running and name not in self._used}
-        for name, size in above(limits, self.names).items():
-            self._used[name] = size
-            os.kill(self._running[name].pid, signal.SIGKILL)
-
-    def _add(self, name: str, child: Child) -> int:
-        self._running[name] = child
-        self.names[child.pid] = name
-        return child.pid
+        limits = {child.name: child.memory for child in self._running.values() if child.memory and not child.used}
+        found = above(limits, self.names) if limits else {}
+        for pid, child in self._running.items():
+            if child.name in found:
+                child.used = found[child.name]
+                os.kill(pid, signal.SIGKILL)
 
     def reap(self) -> None:
         """Collects ended processes, adopted orphans among them."""
-        by_pid = {child.pid: name for name, child in self._running.items()}
         with contextlib.suppress(ChildProcessError):
-            while (info := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOWAIT | os.WNOHANG)) is not None:
-                name = by_pid.get(info.si_pid)
-                if name is None:
-                    os.waitpid(info.si_pid, 0)
-                else:
-                    child = self._running.pop(name)
-                    code = child.wait()
-                    failed = isinstance(child, ConfinedProcess) and child.failed
-                    self._on_exit(name, ChildExit(code, self._used.pop(name, 0), failed))
+            while (ended := os.waitpid(-1, os.WNOHANG))[0]:
+                if child := self._running.pop(ended[0], None):
+                    code, failed = os.waitstatus_to_exitcode(ended[1]), False
+                    if child.process:
+                        child.process.returncode = code  # so that nobody waits for it again
+                    if child.status >= 0:
+                        code, failed = confined_process.ended(child.status, code)
+                    self._on_exit(child.name, code, child.used, failed)
 
     def end_all(self, owns_namespace: bool, wait: Callable[[float], None]) -> None:
         """SIGTERM to the children, GRACE_S to comply, then SIGKILL to all descendants.
@@ -202,8 +183,8 @@ class Children:
         With ``owns_namespace`` this process is process 1 of a namespace, and all others of it are its descendants.
         ``wait`` returns after some seconds, or sooner when a child has ended.
         """
-        for child in reversed(self._running.values()):  # the application first: without a world it would fail
-            for pid in _within(child.pid) if isinstance(child, ConfinedProcess) else (-child.pid,):
+        for child in reversed(self._running):  # the application first: without a world it would fail
+            for pid in _within(child) if child in self.application else (-child,):
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGTERM)
         deadline = time.monotonic() + GRACE_S

@@ -1,7 +1,4 @@
-"""A program of the application in its own sandbox.
-
-The process has the interface of subprocess.Popen that ``Children`` uses.
-"""
+"""A program of the application in its own sandbox."""
 
 import contextlib
 import errno
@@ -26,65 +23,58 @@ _BEGAN = b'"exit-code"'
 """What bubblewrap reports only of a program that it could start (``--json-status-fd``)."""
 
 
-class ConfinedProcess:
-    """``pid`` is that of bubblewrap, which ends with the program and gives its exit code."""
+def start(
+    words: Sequence[str],
+    environment: Mapping[str, str],
+    output: int,
+    confined: Confinement,
+    places: Places | None,
+    umask: int = -1,
+) -> tuple[subprocess.Popen[bytes], int]:
+    """Bubblewrap's process, which ends with the program and gives its exit code, and a descriptor for ``ended``.
 
-    def __init__(
-        self,
-        words: Sequence[str],
-        environment: Mapping[str, str],
-        output: int,
-        confined: Confinement,
-        places: Places | None,
-        umask: int = -1,
-    ) -> None:
-        """``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp."""
-        program = _found(words[0], environment, confined.folder)
-        user = places.user if places else None
-        given = {**environment, **({"HOME": confinement.HOME} if places else {})}
-        others = 0 if user is not None else _threads_of_this_user()
-        sandbox = confinement.sandbox_words(confined, places, program, given)
-        filtered = {"--seccomp": seccomp_filter.program()} if places else {}
-        self._status, status = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-        try:
-            with _in_files(filtered) as passed, os.fdopen(status, "wb"):
-                passed["--json-status-fd"] = status
-                if places and places.namespace is not None:  # which bubblewrap closes as it closes what it waited for
-                    passed |= {"--userns": places.namespace, "--block-fd": places.namespace}
-                sandbox += [word for name, descriptor in passed.items() for word in (name, str(descriptor))]
-                with _in_files({"--args": confinement.as_data(sandbox)}) as files:
-                    self._process = subprocess.Popen(
-                        [PROGRAM, "--args", str(files["--args"]), "--", program, *words[1:]],
-                        env={"PATH": os.environ.get("PATH", os.defpath)},
-                        cwd="/",
-                        stdin=subprocess.DEVNULL,
-                        stdout=output,
-                        stderr=output,
-                        start_new_session=True,
-                        umask=umask,
-                        user=user,
-                        group=user,
-                        extra_groups=None if user is None else [],
-                        pass_fds=(*passed.values(), *files.values()),
-                        preexec_fn=functools.partial(_limit, confined.limits, os.getpid(), others),  # noqa: PLW1509
-                    )
-        except BaseException:
-            os.close(self._status)
-            raise
-        self.pid = self._process.pid
-        self.failed = False
-        """Whether the program never began; known after ``wait``."""
+    ``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp.
+    """
+    program = _found(words[0], environment, confined.folder)
+    user = places.user if places else None
+    given = {**environment, **({"HOME": confinement.HOME} if places else {})}
+    others = 0 if user is not None else _threads_of_this_user()
+    sandbox = confinement.sandbox_words(confined, places, program, given)
+    filtered = {"--seccomp": seccomp_filter.program()} if places else {}
+    said, status = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        with _in_files(filtered) as passed, os.fdopen(status, "wb"):
+            passed["--json-status-fd"] = status
+            if places and places.namespace is not None:  # which bubblewrap closes as it closes what it waited for
+                passed |= {"--userns": places.namespace, "--block-fd": places.namespace}
+            sandbox += [word for name, descriptor in passed.items() for word in (name, str(descriptor))]
+            with _in_files({"--args": confinement.as_data(sandbox)}) as files:
+                process = subprocess.Popen(
+                    [PROGRAM, "--args", str(files["--args"]), "--", program, *words[1:]],
+                    env={"PATH": os.environ.get("PATH", os.defpath)},
+                    cwd="/",
+                    stdin=subprocess.DEVNULL,
+                    stdout=output,
+                    stderr=output,
+                    start_new_session=True,
+                    umask=umask,
+                    user=user,
+                    group=user,
+                    extra_groups=None if user is None else [],
+                    pass_fds=(*passed.values(), *files.values()),
+                    preexec_fn=functools.partial(_limit, confined.limits, os.getpid(), others),  # noqa: PLW1509
+                )
+    except BaseException:
+        os.close(said)
+        raise
+    return process, said
 
-    def wait(self) -> int:
-        """The program's exit code, below 0 for the signal that ended it."""
-        code = self._process.wait()
-        try:
-            said = os.read(self._status, 4096)
-        except BlockingIOError:  # what it was to start has not ended yet
-            said = b""
-        self.failed = code > 0 and _BEGAN not in said
-        os.close(self._status)
-        return 128 - code if code in _SIGNALLED else code
+
+def ended(said: int, code: int) -> tuple[int, bool]:
+    """The program's exit code by bubblewrap's, below 0 for the signal that ended it, and whether it never began."""
+    with os.fdopen(said, "rb") as file:
+        began = _BEGAN in (file.read() or b"")  # None if what it was to start has not ended yet
+    return 128 - code if code in _SIGNALLED else code, code > 0 and not began
 
 
 @contextlib.contextmanager

@@ -11,7 +11,7 @@ killed, the kernel sends SIGTERM to what it started. It has one thread: that sig
                         {"do": "close"}; {"do": "listeners"};
                         {"do": "relay", "cid", "folder"}; {"do": "send", "to": [name, ...], "data"};
                         {"do": "use", "names": services of which memory is measured, too};
-                        {"do": "keep"} with the descriptors of outputs and logs
+                        {"do": "keep"}: stay when the runner ends
     sandbox to runner   {"up": pid} or {"down": why}; {"started": id, "pid"} or
                         {"unstartable": id, "why"}; {"exited": id, "code", "used", "failed"};
                         {"relay": whether it can send};
@@ -48,7 +48,7 @@ from dodo_dsl.run.process.slot import Entered
 PERIOD_S = 0.25
 """Between two looks at the memory of the application's programs."""
 MAX_MESSAGE = 1 << 17
-MAX_DESCRIPTORS = 250
+MAX_DESCRIPTORS = 2
 UMASK = 0o022
 """Of programs in own namespaces, as in containers: what one user's service makes, another's is to read."""
 
@@ -62,12 +62,11 @@ class Sandbox:
         self.is_on_host = is_on_host
         umask = -1 if is_on_host else UMASK
         self.use = UseReader()
-        self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), umask)
+        self.children = Children(self._exited, umask)
         self.places: Places | None = None
         self.relay: Relay | None = None
         self.keep = False
         self.ended = False
-        self.pumps: dict[int, int] = {}
         self.wakeup, writer = os.pipe()
         os.set_blocking(self.wakeup, False)
         os.set_blocking(writer, False)
@@ -80,6 +79,9 @@ class Sandbox:
         if number == signal.SIGTERM:
             self.ended = True
 
+    def _exited(self, name: str, code: int, used: int, failed: bool) -> None:
+        self.send(exited=name, code=code, used=used, failed=failed)
+
     def send(self, **message: object) -> None:
         """Sends a message to the runner, if it is still there."""
         with contextlib.suppress(OSError):
@@ -90,16 +92,13 @@ class Sandbox:
         sources: list[socket.socket | int] = [self.channel, self.wakeup]
         watched_s = 0.0
         while not self.ended:
-            patience = PERIOD_S if self.children.are_watched else None
-            readable, _, _ = select.select([*sources, *self.pumps], [], [], patience)
-            if patience is not None and time.monotonic() >= watched_s + PERIOD_S:
+            readable, _, _ = select.select(sources, [], [], PERIOD_S if self.children.application else None)
+            if time.monotonic() >= watched_s + PERIOD_S:
                 self.children.watch_memory()
                 watched_s = time.monotonic()
             if self.wakeup in readable:
                 self._drain_wakeup()
             self.children.reap()
-            for output in self.pumps.keys() & set(readable):
-                self._pump(output)
             if self.channel in readable and not self._serve():
                 if not self.keep:
                     break
@@ -170,27 +169,11 @@ class Sandbox:
         self.send(use=taken and asdict(taken))
 
     def _do_listeners(self, _descriptors: list[int]) -> None:
-        application = {pid: name for pid, name in self.children.names.items() if name in self.children.limits}
-        found = listening(application) if _has_own_proc() else None
+        found = listening(self.children.application) if _has_own_proc() else None
         self.send(listeners=None if found is None else sorted(found))
 
-    def _do_keep(self, descriptors: list[int]) -> None:
-        """Stays when the runner ends, and writes the services' output into their logs in its place."""
+    def _do_keep(self, _descriptors: list[int]) -> None:
         self.keep = True
-        copies = [os.dup(descriptor) for descriptor in descriptors]
-        half = len(copies) // 2
-        self.pumps = dict(zip(copies[:half], copies[half:], strict=True))
-
-    def _pump(self, output: int) -> None:
-        try:
-            data = os.read(output, 1 << 16)
-        except OSError:  # a terminal that no program has open any more
-            data = b""
-        if data:
-            os.write(self.pumps[output], data)
-        else:
-            os.close(output)
-            os.close(self.pumps.pop(output))
 
     def _do_close(self, _descriptors: list[int]) -> None:
         self.ended = True

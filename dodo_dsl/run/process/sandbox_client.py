@@ -145,7 +145,7 @@ class SandboxClient:
         if self._child is not None:
             self._child.wait()
 
-    def keep(self, descriptors: tuple[int, ...]) -> None:
-        """Lets the sandbox outlive the runner, with the descriptors of outputs, then of their logs."""
+    def keep(self) -> None:
+        """Lets the sandbox outlive the runner."""
         self._closing = True
-        self.send({"do": "keep"}, descriptors)
+        self.send({"do": "keep"})

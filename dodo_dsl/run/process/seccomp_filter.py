@@ -6,16 +6,15 @@ As in Docker's default profile, but without its exceptions for capabilities, whi
 import functools
 import os
 import socket
-from collections.abc import Iterator
 
 _REFUSED = (
-    "acct", "add_key", "adjtimex", "bpf", "clock_adjtime", "clock_settime", "delete_module", "finit_module", "fsconfig",
-    "fsmount", "fsopen", "fspick", "init_module", "io_uring_enter", "io_uring_register", "io_uring_setup", "ioperm",
-    "iopl", "kcmp", "kexec_file_load", "kexec_load", "keyctl", "lookup_dcookie", "mount", "mount_setattr", "move_mount",
-    "name_to_handle_at", "open_by_handle_at", "open_tree", "perf_event_open", "pidfd_getfd", "pivot_root",
-    "process_vm_readv", "process_vm_writev", "ptrace", "quotactl", "reboot", "request_key", "setdomainname",
-    "sethostname", "setns", "settimeofday", "swapoff", "swapon", "syslog", "umount2", "unshare", "userfaultfd",
-    "vhangup",
+    "acct", "add_key", "adjtimex", "bpf", "clock_adjtime", "clock_settime", "delete_module", "finit_module",
+    "fsconfig", "fsmount", "fsopen", "fspick", "init_module", "io_uring_enter", "io_uring_register",
+    "io_uring_setup", "ioperm", "iopl", "kcmp", "kexec_file_load", "kexec_load", "keyctl", "lookup_dcookie",
+    "mount", "mount_setattr", "move_mount", "name_to_handle_at", "open_by_handle_at", "open_tree",
+    "perf_event_open", "personality", "pidfd_getfd", "pivot_root", "process_vm_readv", "process_vm_writev",
+    "ptrace", "quotactl", "reboot", "request_key", "setdomainname", "sethostname", "setns", "settimeofday",
+    "swapoff", "swapon", "syslog", "umount2", "unshare", "userfaultfd", "vhangup",
 )  # fmt: skip
 _EPERM, _ENOSYS = 1, 38
 _CLONE_NAMESPACES = 0x7E020080
@@ -23,8 +22,6 @@ _SOCKET_TYPE = 0xF
 _FAMILIES = (socket.AF_PACKET, socket.AF_ALG, socket.AF_VSOCK)
 _F_SETLEASE = 1024
 """fcntl(2): opening a file under a lease, as DoDo does its own, waits for up to 45 s."""
-_PERSONALITIES = 0x00020008
-"""Bits of personality(2) that may be set: Linux on 32 bits and the version's number. All bits together only ask."""
 _TIOCSTI, _TIOCLINUX = 0x5412, 0x541C
 
 
@@ -58,17 +55,7 @@ def program() -> bytes:
         rules.add_rule(refused, "ioctl", seccomp.Arg(1, seccomp.MASKED_EQ, 0xFFFFFFFF, request))
     for name in ("fcntl", "fcntl64"):
         rules.add_rule(refused, name, seccomp.Arg(1, seccomp.MASKED_EQ, 0xFFFFFFFF, _F_SETLEASE))
-    for is_set, is_clear in _bits_of_other_personalities():
-        rules.add_rule(refused, "personality", seccomp.Arg(0, seccomp.MASKED_EQ, is_set | is_clear, is_set))
     with os.fdopen(os.memfd_create("filter"), "w+b") as file:
         rules.export_bpf(file)
         file.seek(0)
         return file.read()
-
-
-def _bits_of_other_personalities() -> Iterator[tuple[int, int]]:
-    """Pairs of bits, one of which every refused personality has set and the other clear, and no other one."""
-    bits = [1 << bit for bit in range(32)]
-    other = [bit for bit in bits if not _PERSONALITIES & bit]
-    yield from zip(other, [*other[1:], other[0]], strict=True)
-    yield from ((other[0], bit) for bit in bits if _PERSONALITIES & bit)

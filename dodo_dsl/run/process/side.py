@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import functools
 import os
+import subprocess
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -37,6 +38,8 @@ _TIME_READY = b'{"dodo": "ready"}'
 """What gives the application the test's time prints when it does."""
 USE_PATIENCE_S, CONNECT_PATIENCE_S = 2.0, 30.0
 _OUTPUT_S = 1.0
+_COPY = ("cat",)
+"""What goes on writing the log of a service that is kept."""
 _NO_PROGRAM = "bwrap: execvp "
 """How bubblewrap says that it cannot start the application's program."""
 
@@ -308,9 +311,10 @@ class ProcessSide:
 
     def _kept(self, pid: int) -> list[str]:
         running = [name for name in self._starts if not self._watched.outputs[name].done.is_set()]
-        outputs = [self._watched.outputs.pop(name) for name in running]
-        handed = [output.hand_over() for output in outputs]
-        self._sandbox.keep((*(reader for reader, _ in handed), *(log for _, log in handed)))
+        for reader, log in (self._watched.outputs.pop(name).hand_over() for name in running):
+            os.set_blocking(reader, True)
+            subprocess.Popen(_COPY, stdin=reader, stdout=log, stderr=subprocess.DEVNULL, start_new_session=True)
+        self._sandbox.keep()
         look = f"ps -f --ppid {pid}"
         if not self._is_on_host:
             user = "" if os.getuid() == 0 else "-U --preserve-credentials "

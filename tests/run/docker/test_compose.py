@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from docker.errors import ImageNotFound
 
 from dodo_dsl.plan.model import ApplicationService, Plan
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.protocol import BackendError
-from tests.run.docker.test_pulls import EmptyEngine
 from tests.run.scripted import plan
 
 HIDDEN = {"tests/map.json": "tests", ".git/config": ".git", "a.dodo.yml": "a.dodo.yml"}
@@ -124,21 +124,35 @@ def test_a_docker_command_that_cannot_compose(folder: Path, monkeypatch: pytest.
         read(planned({}), folder)
 
 
-@pytest.mark.parametrize("process", [None, ("a",)])
-def test_an_image_that_cannot_be_pulled(process: tuple[str, ...] | None, folder: Path) -> None:
-    """What is not a process already could be one."""
-    test = read(planned({"a": {"image": "team/a"}}, process=process), folder)
+class EmptyEngine:
+    """A client of an engine that has no image."""
+
+    def __init__(self) -> None:
+        self.api = self
+
+    def inspect_image(self, _image: str) -> None:
+        raise ImageNotFound("there is none")
+
+
+def test_an_image_that_cannot_be_pulled(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    test = read(planned({"a": {"image": "r.example.org/a"}}), folder)
     test.plan = replace(test.plan, services=(), isolation="host")
-    with pytest.raises(BackendError, match="image team/a cannot be pulled: not found") as raised:
+    program = folder / "docker"
+    program.write_text("#!/bin/sh\necho 'Error response from daemon: denied' >&2\nexit 1\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
+    told = (
+        "image r.example.org/a cannot be pulled: denied; if the registry requires a login: docker login r.example.org"
+    )
+    with pytest.raises(BackendError, match=f"^{told}$"):
         asyncio.run(test.provide_images(Pulls(EmptyEngine())))
-    assert ("x-dodo-process" in str(raised.value)) is (process is None)
 
 
 def test_a_run_builds_from_a_copy_and_replaces_no_image(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The image has a name of its own for all that use it; one that a pipeline has built is pulled."""
     pulled: list[set[str]] = []
 
-    async def provide(_: object, own: set[str], foreign: set[str], *__: object) -> list[str]:
+    async def provide(_: object, plan: Plan, own: set[str], foreign: set[str], *__: object) -> list[str]:
         pulled.append(foreign)
         return []
 

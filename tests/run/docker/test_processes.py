@@ -1,8 +1,5 @@
 """The processes of containers: found by the engine's answers, and only on the machine that runs them."""
 
-import asyncio
-import contextlib
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,11 +10,7 @@ from docker.errors import APIError
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker import container_use
 from dodo_dsl.run.docker.container_use import ContainerUse
-from dodo_dsl.run.docker.side import ContainerSide
 from dodo_dsl.run.machine_load.service_use import Used
-from dodo_dsl.run.protocol import BackendError
-from dodo_dsl.run.sides import WatchedServices
-from tests.run.helpers import Bench
 from tests.run.load.test_service_use import Proc
 
 NOBODY: Any = None
@@ -66,28 +59,6 @@ def test_the_first_processes_of_the_application(proc: Proc) -> None:
     found = ContainerUse({**containers, "mute": Container("c0ffee", 10, APIError("no"))}, proc=proc.root)
     assert found.first(["app", "ended"]) == {10: "app"}
     assert (found.first(["app", "far"]), found.first(["mute"])) == (None, None)
-
-
-@pytest.mark.parametrize(("isolation", "pids"), [("host", [10]), ("host", [11]), ("network", [11]), ("host", [11, 0])])
-@pytest.mark.thorough
-def test_a_test_on_the_network_of_another_host_does_not_begin(
-    isolation: str, pids: list[int], proc: Proc, tmp_path: Path
-) -> None:
-    """In the engine's own network of a test it does, and so it does where a service ends meanwhile."""
-
-    class Changing(Container):
-        def reload(self) -> None:
-            self.attrs = {"State": {"Pid": pids.pop(0) if len(pids) > 1 else pids[0]}}
-
-    async def begin() -> None:
-        plan = replace(Bench(tmp_path).plan(), isolation=isolation)
-        side = ContainerSide(WatchedServices(plan, tmp_path, tmp_path), NOBODY, NOBODY, NOBODY, ())
-        side._use = ContainerUse({"app": Changing("c0ffee", 0)}, proc=proc.root)
-        await side._require_here()
-
-    refused = pytest.raises(BackendError, match=r"another machine.*use --isolation network")
-    with refused if (isolation, pids) == ("host", [11]) else contextlib.nullcontext():
-        asyncio.run(begin())
 
 
 STATS = {

@@ -4,11 +4,8 @@ import asyncio
 from collections.abc import Callable, Coroutine
 
 import pytest
-from docker.errors import ImageNotFound
 
-from dodo_dsl.plan.model import PlannedService
-from dodo_dsl.run.docker import pulls as docker_pulls
-from dodo_dsl.run.docker.pulls import Pulls
+from dodo_dsl.run.docker.pulls import Pulls, building
 from dodo_dsl.run.protocol import BackendError
 from tests.run.scripted import plan
 
@@ -40,29 +37,7 @@ def test_what_failed_is_tried_again_and_then_kept() -> None:
     assert len(tries) == 2
 
 
-class EmptyEngine:
-    """A client of an engine that has no image, and whose registries have none."""
-
-    def __init__(self) -> None:
-        self.api = self
-
-    def inspect_image(self, _image: str) -> None:
-        raise ImageNotFound("there is none")
-
-    def pull(self, *_words: str, **_options: bool) -> None:
-        raise ImageNotFound("not found")
-
-
 def test_images_that_were_never_built() -> None:
-    services = (
-        PlannedService("evaluation", "judge", "judge", "team/judge:7", ("python", "-m", "my_services.judge")),
-        PlannedService("evaluation", "radar", "radar", "elsewhere/radar:1", ("radar",)),
-        PlannedService("evaluation", "track", "collision", "team/collision:7", ("python", "-m", "services.collision")),
-    )
-    hints = docker_pulls.image_hints(plan(services=services, sandbox_image="team/sandbox:7"))
-    own = "build it from your own Dockerfile on team/base:7: dodo images build judge --prefix team --tag 7"
-    shipped = "'dodo images build --prefix team --tag 7' makes it"
-    assert hints == {"team/judge:7": own, "team/collision:7": shipped, "team/sandbox:7": shipped}
-    for name, told in hints.items():
-        with pytest.raises(BackendError, match=rf"^image {name} cannot be pulled: not found; {told}$"):
-            asyncio.run(Pulls(EmptyEngine()).provide([name], [], lambda _: None, hints))
+    made = plan(sandbox_image="team/sandbox:7")
+    told = "; 'dodo images build --prefix team --tag 7' makes DoDo's images, and your own ones build on team/base:7"
+    assert [building(made, name) for name in ("team/judge:7", "team/judge:8", "other/judge:7")] == [told, "", ""]
