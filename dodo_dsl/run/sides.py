@@ -123,8 +123,6 @@ class WatchedServices:
                 return self._take_finding(line)
             return layer != APPLICATION and self.reports.take_line(name, line)
 
-        if name in self.outputs:  # it is started once more
-            self.outputs[name].close()
         log = self.report / "logs" / f"{layer}.{name}.log"
         match = partial(self.lines.match, name) if self.prints(name) else None
         self.outputs[name] = ServiceOutput(log, take or on_line, match=match, **kind)

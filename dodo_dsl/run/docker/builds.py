@@ -9,7 +9,7 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,60 +47,52 @@ class HiddenContext(Exception):
     """A build asks for a folder that no application sees; the message says which."""
 
 
-def own_contexts(services: Mapping[str, Any], hidden: Sequence[Path], copies: Path, folder: Path) -> dict[str, Any]:
+def own_contexts(services: Mapping[str, Any], hidden: Collection[Path], copies: Path, folder: Path) -> dict[str, Any]:
     """The services' builds with copies below ``copies``, which exists, of contexts that hold what is ``hidden``.
 
     Paths are relative to ``folder``. Files are links to the same content where the file system can do that. Raises
     HiddenContext, and OSError where nothing can be written.
     """
-    contexts = _Contexts(frozenset([*hidden, copies.resolve()]), copies, folder)
+    hidden, copied = frozenset([*hidden, copies.resolve()]), dict[Path, str]()
+
+    def copy_of(name: str, context: str) -> str:
+        """The copy of a context; empty for one that is elsewhere, or holds nothing that is hidden."""
+        place = Path(os.path.realpath(whole(context, folder)))
+        if _REMOTE.match(context) or not place.is_dir():
+            return ""
+        if any(place.is_relative_to(path) for path in hidden) or _GIT in place.parts:
+            raise HiddenContext(f"the build of '{name}' takes '{context}', where tests, their output or .git are kept")
+        if place not in copied:
+            is_whole = not any(path.is_relative_to(place) for path in hidden) and not os.path.lexists(place / _GIT)
+            target = copies / str(len(copied)) / (place.name or "root")  # by this name builders find what they had
+            copied[place] = "" if is_whole else _copy(place, target, hidden)
+        return copied[place]
+
+    def build(name: str, written: Mapping[str, Any]) -> dict[str, Any]:
+        made, context = dict(written), str(written.get("context") or ".")
+        if own := copy_of(name, context):
+            made["context"] = escaped(own)
+            file = str(made.get("dockerfile") or "Dockerfile")
+            if "dockerfile_inline" not in made and not os.path.lexists(Path(own, file.replace("$$", "$"))):
+                made["dockerfile"] = f"{escaped(whole(context, folder))}/{file}"
+        if others := made.get("additional_contexts"):
+            made["additional_contexts"] = {key: escaped(copy_of(name, path)) or path for key, path in others.items()}
+        return made
+
     return {
         name: {key: service[key] for key in ("image", "platform") if service.get(key)}
-        | {"build": contexts.build(name, service["build"])}
+        | {"build": build(name, service["build"])}
         for name, service in services.items()
     }
 
 
-class _Contexts:
-    """One copy for all builds of the same folder."""
+def _copy(place: Path, target: Path, hidden: Collection[Path]) -> str:
+    def left_out(folder: str, names: Sequence[str]) -> set[str]:
+        found = {name: Path(folder, name) for name in names}
+        return {name for name, path in found.items() if name == _GIT or path in hidden or _is_odd(path)}
 
-    def __init__(self, hidden: frozenset[Path], copies: Path, folder: Path) -> None:
-        self._hidden, self._copies, self._folder = hidden, copies, folder
-        self._copied: dict[Path, str] = {}
-
-    def build(self, name: str, written: Mapping[str, Any]) -> dict[str, Any]:
-        build, context = dict(written), str(written.get("context") or ".")
-        if own := self._copy_of(name, context):
-            build["context"] = escaped(own)
-            file = str(build.get("dockerfile") or "Dockerfile")
-            if "dockerfile_inline" not in build and not os.path.lexists(Path(own, file.replace("$$", "$"))):
-                build["dockerfile"] = f"{escaped(whole(context, self._folder))}/{file}"
-        if others := build.get("additional_contexts"):
-            build["additional_contexts"] = {key: escaped(self._copy_of(name, p)) or p for key, p in others.items()}
-        return build
-
-    def _copy_of(self, name: str, context: str) -> str:
-        """The copy of a context; empty for one that is elsewhere, or holds nothing that is hidden."""
-        place = Path(os.path.realpath(whole(context, self._folder)))
-        if _REMOTE.match(context) or not place.is_dir():
-            return ""
-        if any(place.is_relative_to(path) for path in self._hidden) or _GIT in place.parts:
-            raise HiddenContext(f"the build of '{name}' takes '{context}', where tests, their output or .git are kept")
-        if place not in self._copied:
-            is_whole = not any(path.is_relative_to(place) for path in self._hidden)
-            self._copied[place] = "" if is_whole and not os.path.lexists(place / _GIT) else self._copy(place)
-        return self._copied[place]
-
-    def _copy(self, place: Path) -> str:
-        """A copy under the folder's own name, by which builders find what they got of it before."""
-        target = self._copies / str(len(self._copied)) / (place.name or "root")
-
-        def left_out(folder: str, names: Sequence[str]) -> set[str]:
-            found = {name: Path(folder, name) for name in names}
-            return {name for name, path in found.items() if name == _GIT or path in self._hidden or _is_odd(path)}
-
-        shutil.copytree(place, target, symlinks=True, ignore=left_out, copy_function=_link)
-        return str(target)
+    shutil.copytree(place, target, symlinks=True, ignore=left_out, copy_function=_link)
+    return str(target)
 
 
 def _is_odd(path: Path) -> bool:

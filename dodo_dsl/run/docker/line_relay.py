@@ -1,15 +1,17 @@
 """What containers print, as it comes, and a sender in a test's network: a program next to its recorder."""
 
 import contextlib
+import errno
 import os
 import socket
+import subprocess
 from collections.abc import Iterable
 from typing import Any, BinaryIO
 
+from dodo_dsl.application import secret_variables
 from dodo_dsl.opendlv.relay import BUS
 
 _COMMAND = ("python", "-m", "dodo_dsl.opendlv.relay")
-_START_S = 30.0
 _CHUNK = 1 << 16
 _HEADER_BYTES = 8
 """Before each piece of a program's output without a terminal; the last four are its length."""
@@ -38,39 +40,29 @@ def copy_into(answer: Any, is_terminal: bool, writer: int) -> None:
 
 
 class ContainerRelay:
-    """``Relay`` in the network of a container that has DoDo's programs.
+    """``Relay`` in the network of a container that has DoDo's programs; raises OSError where it does not start."""
 
-    Raises DockerException, and OSError or ValueError where the program does not start.
-    """
-
-    def __init__(self, container: Any, cid: int) -> None:
-        api = container.client.api
-        self._exec = api.exec_create(container.id, [*_COMMAND, str(cid)], stdin=True, stdout=True, stderr=True)["Id"]
-        self._answer = api.exec_start(self._exec, socket=True)
-        self._stream = _socket(self._answer)
-        self._stream.settimeout(_START_S)
-        try:
-            self._await_start()
-        except (OSError, ValueError):
+    def __init__(self, container: str, cid: int) -> None:
+        words = ["docker", "exec", "--interactive", container, *_COMMAND, str(cid)]
+        self._process = subprocess.Popen(
+            words, env=secret_variables.of_client(os.environ), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT, start_new_session=True
+        )  # fmt: skip
+        assert self._process.stdin and self._process.stdout
+        self._input, output = self._process.stdin, self._process.stdout
+        if (said := output.readline().strip()) != b"ready":
             self.close()
-            raise
-
-    def _await_start(self) -> None:
-        data = b""
-        with self._stream.makefile("rb") as output:
-            while not data.endswith(b"\n") and (piece := _piece(output)):
-                data += piece
-        said = " ".join(data.decode("utf-8", "replace").split())
-        if said != "ready":
-            raise ValueError(f"the program that sends it says '{said[:200]}'")
+            raise OSError(errno.EPIPE, f"the program that sends it says '{said[:200].decode(errors='replace')}'")
 
     def send(self, data: bytes, to: Iterable[str] = (BUS,)) -> None:
         """Sends a datagram to services by their names, or loses it where the program has ended."""
         with contextlib.suppress(OSError):
-            self._stream.sendall(" ".join([*to, f"{data.hex()}\n"]).encode())
+            self._input.write(" ".join([*to, f"{data.hex()}\n"]).encode())
+            self._input.flush()
 
     def close(self) -> None:
-        close(self._answer)
+        self._process.kill()
+        self._process.communicate()
 
 
 def _socket(answer: Any) -> socket.socket:

@@ -214,13 +214,11 @@ class ContainerSide:
         return await self._watched.start(names, start, reports)
 
     async def connect(self) -> Send:
-        from docker.errors import DockerException
-
+        own = self._containers.get(RECORDER) or self._containers[self._plan.services[0].name]
         try:
-            own = self._containers.get(RECORDER) or self._containers[self._plan.services[0].name]
-            self._relay = await asyncio.to_thread(ContainerRelay, own, self._plan.cid)
-        except (DockerException, OSError, ValueError) as error:
-            raise BackendError(f"nothing can be sent to the test's services: {engine_error(error)}") from error
+            self._relay = await asyncio.to_thread(ContainerRelay, own.id, self._plan.cid)
+        except OSError as error:
+            raise BackendError(f"nothing can be sent to the test's services: {error.strerror}") from error
         return self._relay.send
 
     async def _start(self, layer: str, name: str) -> None:

@@ -4,7 +4,7 @@ A test in real time on a machine that was too busy ends in error. Answers in loc
 application's use of processors and memory become checks where the test asks for them, else notes.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from dodo_dsl.outcome import (
@@ -38,14 +38,8 @@ _WAY_OUT = "run it with --clock lockstep, or fewer tests at once (-j 1)"
 def consider(finding: Finding, load: MachineLoad | None) -> tuple[Finding, MachineLoad | None]:
     """An error in place of a failure that may be due to a busy machine; anything else as it is. The load says so, too.
 
-    Only findings that depend on time can turn. An application that waits for a tenth of the time answers each picture
-    of a 10 Hz camera 10 ms later on average, some much later, as waits come in bursts: on two cores with four busy
-    loops, the example application waited for a fifth of the time and more when it failed. DoDo's own services wait
-    often and shortly at 100 Hz, which harms nobody as long as they keep to their schedule, so their lateness counts
-    instead, in the same proportion. What the application brings upon itself, with many threads or long computations, is
-    left out by the measure: a wait counts only while the machine was full and others than the application took at least
-    half of what was taken. DoDo's own services are such others. An emulated rig that stood still for more than it takes
-    to be late at all is another machine than the rig, whatever else was measured.
+    Only findings that depend on time can turn (docs/decisions/0007). An emulated rig that stood still is not a rig,
+    whatever else was measured.
     """
     if load is None or finding.result != "failed" or finding.cause != "verdict" or not (why := too_busy(load)):
         return finding, load
@@ -83,8 +77,6 @@ UNSEEN_USE = (
 )
 MOST_SLOW = 0.1
 """Share of answers that may take longer than the frames' period before a note says so."""
-MOST_PERIODS = 10
-"""The periods of frames that one answer may take before a note says so."""
 _MB = 1e6
 
 
@@ -125,17 +117,14 @@ def judged_response(response: Response | None, lockstep: Lockstep | None, servic
     if lockstep.is_copied:
         reason = f"{response.uncopied} of {answers} answers did not carry the sample time of their frame"
         judged = judged.judged(SAMPLE_TIMES, response.uncopied, 0, reason, who)
-    return judged.noted(*_notes(response))
+    return judged.noted(_slowness(response))
 
 
-def _notes(response: Response) -> Iterator[str]:
-    if response.slow > MOST_SLOW * response.answers:
-        slow = f"{response.slow} of {response.answers} answers took longer than the frames' period"
-        yield f"too slow for real time: {slow} of {response.period_s * 1000:g} ms; {response.in_words()}"
-    if response.worst_s > MOST_PERIODS * response.period_s:
-        which = f" to frame {response.worst_frame}" if response.worst_frame else ""
-        frames = f"{response.worst_s / response.period_s:.0f} frames, which outside lockstep would not have waited"
-        yield f"the answer{which} took {response.worst_s:.3g} s, as long as {frames}"
+def _slowness(response: Response) -> str:
+    if response.slow <= MOST_SLOW * response.answers:
+        return ""
+    slow = f"{response.slow} of {response.answers} answers took longer than the frames' period"
+    return f"too slow for real time: {slow} of {response.period_s * 1000:g} ms; {response.in_words()}"
 
 
 def judged_use(uses: Sequence[ServiceUse], limits: ResourceLimits | None) -> JudgedFigures:

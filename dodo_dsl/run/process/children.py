@@ -29,7 +29,7 @@ _DESCRIPTORS = 65_536
 
 
 def _forked(words: Sequence[str], environment: Mapping[str, str], folder: str, output: int) -> int:
-    """The process id of a child of this process, which has one thread, in a session of its own.
+    """The process id of a child of this process, which has one thread, in a separate session.
 
     ``words`` are ``python -m MODULE`` and its arguments; raises OSError when the folder cannot be entered.
     """

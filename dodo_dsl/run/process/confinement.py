@@ -6,7 +6,6 @@ what bubblewrap executes next.
 """
 
 import os
-import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -58,10 +57,6 @@ def _inside(hidden: Iterable[Path], shown: Iterable[str]) -> Iterator[str]:
 
 
 PROGRAM = "bwrap"
-MOUNT_GONE = re.compile(r'bwrap: .*remount ".*": No such file or directory')
-"""What it says when somebody, such as a container engine, removed a mount while it copied those of the host."""
-MOST_TRIES = 10
-"""How often it is started then."""
 HOME = "/home/application"
 MERGED = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")
 """On Debian since 12 these are links into /usr."""

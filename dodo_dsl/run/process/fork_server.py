@@ -3,9 +3,9 @@
 Loading numpy, OpenCV and similar takes most of the processor time of a short test's set-up. Sandboxes with their own
 namespaces are forked from here; their services are forks of them in turn.
 
-    runner to fork server   {"load": [module of a service of DoDo's, ...]}; with "entered", as the sandbox has it, and
-                            the descriptors of the sandbox's end of its channel, of its log, and of leases that it
-                            holds, too, it forks
+    runner to fork server   {"load": [module of a service of DoDo's, ...]};
+                            the same with "process" and "shown" of what a sandbox enters, and descriptors of its end of
+                            its channel, of its log, and of leases that it holds, too: it is forked
 """
 
 import contextlib
@@ -18,6 +18,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.slot import Entered, package_path
@@ -50,7 +51,9 @@ class ForkServer:
 
     def fork(self, entered: Entered, modules: Iterable[str], descriptors: Sequence[int]) -> None:
         """Starts a sandbox that has loaded modules; the first ``descriptors`` are its end of a channel, and its log."""
-        self._send({"load": sorted(modules), "entered": entered.word()}, descriptors)
+        self._send(
+            {"load": sorted(modules), "process": entered.process, "shown": [*map(str, entered.shown)]}, descriptors
+        )
 
     def _send(self, message: dict[str, object], descriptors: Sequence[int] = ()) -> None:
         with contextlib.suppress(OSError):  # it has ended, which a sandbox's channel says
@@ -119,12 +122,13 @@ def serve(runner: socket.socket) -> None:
         load_services(message["load"])
         if descriptors and os.fork() == 0:
             runner.close()
-            os._exit(_sandbox(descriptors[0], descriptors[1], message["entered"]))
+            entered = Entered(message["process"], tuple(map(Path, message["shown"])))
+            os._exit(_sandbox(descriptors[0], descriptors[1], entered))
         for descriptor in descriptors:
             os.close(descriptor)
 
 
-def _sandbox(channel: int, log: int, entered: str) -> int:
+def _sandbox(channel: int, log: int, entered: Entered) -> int:
     """The fork's whole life; its exit code."""
     from dodo_dsl.run.process import sandbox
 
@@ -134,7 +138,7 @@ def _sandbox(channel: int, log: int, entered: str) -> int:
     os.setsid()
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     try:
-        return sandbox.serve(socket.socket(fileno=channel), Entered.of(entered))
+        return sandbox.serve(socket.socket(fileno=channel), entered)
     except BaseException:  # noqa: BLE001  (it is printed as Python does)
         sys.excepthook(*sys.exc_info())
         return 1

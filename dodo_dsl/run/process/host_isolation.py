@@ -87,11 +87,7 @@ async def host_slot(
         return None
 
     try:
-        turn = await leases.lease_any(["turn"], about, say)  # who waits for the machine alone has it next
-        try:
-            held.append(await leases.lease_any(["machine"], about, say, shared=not alone))
-        finally:
-            turn.release()
+        held.append(await leases.lease_any(["machine"], about, say, shared=not alone))
         order = [plan.cid, *(c for c in cids if c != plan.cid)]
         lease = await leases.lease_any([f"{leases.CID}{c}" for c in order], about, say, attempt=attempt)
         held.append(lease)

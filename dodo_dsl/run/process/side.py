@@ -25,7 +25,7 @@ from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import Send
 from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.commands import Command, Commands, needed_paths, own_modules
-from dodo_dsl.run.process.confinement import MOST_TRIES, MOUNT_GONE, confinement
+from dodo_dsl.run.process.confinement import confinement
 from dodo_dsl.run.process.fork_server import ForkServer
 from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
@@ -119,8 +119,6 @@ class ProcessSide:
         self._fork_server, self._is_on_host, self._is_apart = fork_server, fork_server is None, is_apart
         self._gives_time, self._has_time = is_whole and self._plan.lockstep is not None, False
         self._commands = Commands(self._plan, self._folder, self._report, slot)
-        self._starts: dict[str, list[Command]] = {}
-        """The commands by which each service was started, several where a mount went meanwhile."""
         self._exits: list[asyncio.Future[None]] = []
         self._asked: dict[str, asyncio.Future[Any]] = {}
         """What the sandbox is to answer, by what it is asked to do."""
@@ -157,10 +155,6 @@ class ProcessSide:
             return
         if failed:
             said = " ".join(self._watched.tail(exited)[-1:])
-            starts = self._starts[exited]
-            if self._is_on_host and MOUNT_GONE.match(said) and len(starts) < MOST_TRIES:
-                self._start(starts[-1])
-                return
             why = f"its sandbox cannot be set up: {said or f'exit code {code}'}"
             if said.startswith(_NO_PROGRAM):
                 why = said.removeprefix(_NO_PROGRAM)
@@ -226,7 +220,6 @@ class ProcessSide:
 
     def _start(self, command: Command) -> None:
         output = self._output(command)
-        self._starts.setdefault(command.name, []).append(command)
         hidden = command.masked if self._is_on_host and self._is_apart else ()
         words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.is_module, "masked": hidden}
         own = {"id": command.name, "env": dict(command.environment), "confined": self._confined(command)}
@@ -310,7 +303,7 @@ class ProcessSide:
         return []
 
     def _kept(self, pid: int) -> list[str]:
-        running = [name for name in self._starts if not self._watched.outputs[name].done.is_set()]
+        running = [name for name, output in self._watched.outputs.items() if not output.done.is_set()]
         for reader, log in (self._watched.outputs.pop(name).hand_over() for name in running):
             os.set_blocking(reader, True)
             subprocess.Popen(_COPY, stdin=reader, stdout=log, stderr=subprocess.DEVNULL, start_new_session=True)

@@ -4,7 +4,6 @@ A sandbox enters its own namespaces, or those of a container, which the applicat
 services and sandboxes.
 """
 
-import json
 import os
 import sys
 from collections.abc import Iterable
@@ -54,16 +53,6 @@ class Entered:
         inside = ((folder, name.relative_to(folder).parts) for folder in namespaces.SHARED for name in map(Path, names)
                   if name.is_relative_to(folder))  # fmt: skip
         return cls(process, tuple(sorted({folder / parts[0] for folder, parts in inside if parts})))
-
-    def word(self) -> str:
-        """For a sandbox's command line."""
-        return json.dumps([self.process, *map(str, self.shown)])
-
-    @classmethod
-    def of(cls, word: str) -> Self:
-        """As in a sandbox's command line."""
-        process, *shown = json.loads(word)
-        return cls(process, tuple(map(Path, shown)))
 
 
 def named_paths(words: Iterable[str]) -> list[Path]:

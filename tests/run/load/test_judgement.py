@@ -91,10 +91,6 @@ COPIED = replace(PLAIN, is_copied=True)
             "too slow for real time: 58 of 60 answers took longer than the frames' period of 100 ms; an answer took "
             "500 ms (median), 520 ms (95 %), 750 ms (worst) on the processor, on Some CPU, 2000 MHz",
         ),
-        (
-            replace(FAST, worst_s=1.5, worst_frame=17), PLAIN,
-            "the answer to frame 17 took 1.5 s, as long as 15 frames, which outside lockstep would not have waited",
-        ),
     ],
 )  # fmt: skip
 def test_how_an_application_answers_is_a_note(response: Response | None, lockstep: Lockstep | None, note: str) -> None:
