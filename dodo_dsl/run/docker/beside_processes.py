@@ -11,6 +11,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from docker.errors import DockerException, ImageNotFound
+
 from dodo_dsl.application.interpolation import escaped
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import TIME
@@ -34,8 +36,6 @@ _NOBODY = "containers-of-dodo"
 
 def provide_image(client: Any) -> None:
     """Makes the empty image, unless the engine has it; raises BackendError."""
-    from docker.errors import DockerException, ImageNotFound
-
     try:
         try:
             client.api.inspect_image(IMAGE)

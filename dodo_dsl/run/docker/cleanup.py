@@ -15,6 +15,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from docker.errors import APIError, DockerException, NotFound
+
 from dodo_dsl.application import secret_variables
 from dodo_dsl.emit.compose import REPORT
 from dodo_dsl.plan.model import Plan
@@ -42,8 +44,6 @@ def _filters(project: str) -> dict[str, str]:
 
 def stop_project(client: Any, project: str) -> None:
     """SIGTERM to all containers at once, SIGKILL to those that do not end within 2 s."""
-    from docker.errors import DockerException
-
     containers = client.containers.list(filters=_filters(project))
     with (
         ThreadPoolExecutor(max_workers=max(1, len(containers))) as pool,
@@ -58,8 +58,6 @@ def remove_project(client: Any, project: str, rests_s: Sequence[float] = _RESTS_
     Goes on when one cannot be removed, tries it again after each of ``rests_s``, and raises the first such error at the
     end; raises OSError at once.
     """
-    from docker.errors import APIError, NotFound
-
     removed, problem = 0, None
     for rest_s in (0.0, *rests_s):
         time.sleep(rest_s)
@@ -101,8 +99,6 @@ def reap_projects(client: Any) -> Reaped:
 
     A project that cannot be removed keeps its record for the next time.
     """
-    from docker.errors import DockerException
-
     reaped = Reaped()
     for lease in leases.orphans(leases.PROJECT):
         project, test = lease.name.removeprefix(leases.PROJECT), lease.left.get("test", "?")

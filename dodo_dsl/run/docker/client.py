@@ -7,6 +7,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import docker
+from docker.constants import DEFAULT_DOCKER_API_VERSION
+from docker.errors import DockerException, NotFound
+
 from dodo_dsl import advice, atomic
 from dodo_dsl.run import application_time
 from dodo_dsl.run.protocol import BackendError
@@ -29,9 +33,6 @@ class NoEngine(BackendError):
 
 def connect() -> Any:
     """A client of the engine; raises NoEngine when none answers."""
-    from docker.constants import DEFAULT_DOCKER_API_VERSION
-    from docker.errors import DockerException
-
     try:
         with contextlib.closing(_client(DEFAULT_DOCKER_API_VERSION)) as first:
             version = first.api.version(api_version=False)["ApiVersion"]
@@ -47,8 +48,6 @@ def _client(version: str) -> Any:
 
     Without this, certificates that REQUESTS_CA_BUNDLE or CURL_CA_BUNDLE name would take the place of those.
     """
-    import docker
-
     client = docker.from_env(version=version, max_pool_size=_CONNECTIONS)
     client.api.trust_env = not client.api.base_url.startswith("https:")
     return client
@@ -76,8 +75,6 @@ def refusal(
 
     ``entrypoint``, ``command`` and ``variables`` are the compose file's, in place of the image's or beside them.
     """
-    from docker.errors import NotFound
-
     config = client.images.get(image).attrs["Config"]
     words = [
         *(entrypoint or config.get("Entrypoint") or ()),

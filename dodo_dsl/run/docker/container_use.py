@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from docker.errors import DockerException
+
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.run.listeners import joined, listening
 from dodo_dsl.run.machine_load.processes import PROC
@@ -63,8 +65,6 @@ class ContainerUse:
 
 def _asked(container: Any) -> Used | None:
     """What a container used by the engine (``GET /containers/ID/stats``), if it knows."""
-    from docker.errors import DockerException
-
     with contextlib.suppress(DockerException, OSError, KeyError, TypeError, StopIteration):
         stats = container.client.api.stats(container.id, stream=False, one_shot=True)
         rows = stats["memory_stats"]["stats"]
@@ -78,8 +78,6 @@ def first_process(container: Any, proc: Path = PROC) -> int | None:
 
     A process of another machine may have the number of one here.
     """
-    from docker.errors import DockerException
-
     try:
         container.reload()
         pid = int(container.attrs["State"].get("Pid") or 0)

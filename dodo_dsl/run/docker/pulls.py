@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from docker.errors import DockerException, ImageNotFound
+
 from dodo_dsl.application import secret_variables
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.docker.client import run
@@ -56,8 +58,6 @@ class Pulls:
         raise BackendError(f"{problem}{_login(image, text)}{building(plan, image)}")
 
     def _has(self, image: str) -> bool:
-        from docker.errors import DockerException, ImageNotFound
-
         try:
             self._client.api.inspect_image(image)
         except ImageNotFound:

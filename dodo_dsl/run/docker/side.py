@@ -9,6 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from docker.errors import DockerException
+
 from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import RECORDER
@@ -104,16 +106,12 @@ class ContainerSide:
         self._compose.by_answers = self._watched.by_answers
 
     async def _refusal(self, *words: Any) -> str:
-        from docker.errors import DockerException
-
         try:
             return await asyncio.to_thread(refusal, self._client, *words)
         except (DockerException, OSError):  # the clock names a service that never loads the library
             return ""
 
     async def _start_watching(self) -> None:
-        from docker.errors import DockerException
-
         try:
             label = {"label": f"{PROJECT_LABEL}={self._compose.project}"}
             found = await asyncio.to_thread(self._client.containers.list, all=True, filters=label)
@@ -167,8 +165,6 @@ class ContainerSide:
         self._out_of_memory.add(name)
 
     def _kill(self, name: str) -> None:
-        from docker.errors import DockerException
-
         with contextlib.suppress(DockerException, OSError):  # it has ended
             self._containers[name].kill()
 
@@ -193,8 +189,6 @@ class ContainerSide:
         self._watched.ended(name, code, name in self._out_of_memory)
 
     def _ask_for_memory_kill(self, name: str) -> None:
-        from docker.errors import DockerException
-
         with contextlib.suppress(DockerException, OSError):
             self._containers[name].reload()
             if self._containers[name].attrs["State"].get("OOMKilled"):
@@ -223,8 +217,6 @@ class ContainerSide:
 
     async def _start(self, layer: str, name: str) -> None:
         """Starts a service; where it waited for others, its own health is awaited, too."""
-        from docker.errors import DockerException
-
         has_terminal = bool(self._containers[name].attrs.get("Config", {}).get("Tty"))
         output = self._watched.output(layer, name, is_cooked=has_terminal)
         try:
@@ -249,8 +241,6 @@ class ContainerSide:
 
     def _start_container(self, name: str) -> Any:
         """Starts a container; what it prints."""
-        from docker.errors import DockerException
-
         printed = attached(self._containers[name])  # before its start, because it may end at once
         try:
             self._containers[name].start()
@@ -299,8 +289,6 @@ class ContainerSide:
 
 
 def _last_line(container: Any) -> str:
-    from docker.errors import DockerException
-
     with contextlib.suppress(DockerException, OSError):
         return str(container.logs(tail=1).decode("utf-8", "replace").strip())
     return ""

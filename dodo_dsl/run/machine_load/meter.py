@@ -11,10 +11,7 @@ from dataclasses import dataclass
 from dodo_dsl.outcome import MachineLoad, ServiceUse, Wait
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
 
-FIRST_PERIOD_S, MOST_PERIOD_S = 0.04, 0.25
-"""A test of 30 frames in lockstep may be over in a second, and a long one needs no more than a few looks a second."""
-_PERIOD_SHARE, _TIMES_COST = 0.02, 3
-"""Of the time that passed so far, and how many times as long as a look took, until the next one."""
+PERIOD_S = 0.125
 LAST_PATIENCE_S = 1.0
 WINDOW_S = 0.4
 """The least time over which it is decided whether the machine was full."""
@@ -22,11 +19,6 @@ FULL = 0.8
 """Share of the cores from which on the machine is full: rows of ticks of 10 ms are no more precise."""
 OTHERS = 0.5
 """Share of the time on processors with which others than the application take most of the machine."""
-
-
-def period_s(passed_s: float, took_s: float = 0.0) -> float:
-    """Seconds until the next look, by what passed so far, and what the last one took."""
-    return min(max(FIRST_PERIOD_S, _PERIOD_SHARE * passed_s, _TIMES_COST * took_s), MOST_PERIOD_S)
 
 
 @dataclass
@@ -77,12 +69,9 @@ class Meter:
                 await self._look()
 
     async def _run(self) -> None:
-        now = asyncio.get_running_loop().time
-        began = now()
         while True:
-            looked = now()
             await self._look()
-            await asyncio.sleep(period_s(now() - began, now() - looked))
+            await asyncio.sleep(PERIOD_S)
 
     async def _look(self) -> None:
         if (snapshot := await self._take()) is not None:

@@ -39,7 +39,6 @@ class SandboxClient:
         self._child: subprocess.Popen[bytes] | None = None
         self._end = -1
         self._socket: socket.socket | None = None
-        self._up: asyncio.Future[dict[str, Any]] | None = None
         self._closing = False
 
     async def open(
@@ -52,8 +51,7 @@ class SandboxClient:
         """
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", SEND_S, 0))  # it may be busy
-        self._socket, self._up = ours, asyncio.get_running_loop().create_future()
-        asyncio.get_running_loop().add_reader(ours, self._receive)
+        self._socket = ours
         with theirs:
             if server is not None:
                 server.fork(entered, modules, [theirs.fileno(), log, *slot.descriptors])
@@ -67,18 +65,17 @@ class SandboxClient:
                     start_new_session=True,
                     env={**own_environment(), "PYTHONPATH": package_path(), SLOT_VARIABLE: slot.name},
                 )
-        answer = await self._up
+        loop = asyncio.get_running_loop()
+        ours.setblocking(False)
+        said = await loop.sock_recv(ours, MAX_MESSAGE)
+        ours.setblocking(True)
+        answer: dict[str, Any] = json.loads(said) if said else {"down": "it ended at once"}
         if "up" not in answer:
-            self._close_socket()
             raise BackendError(f"the test's sandbox does not start: {answer['down']}")
+        loop.add_reader(ours, self._receive)
         self.pid = answer["up"]
         with contextlib.suppress(ProcessLookupError):
             self._end = os.pidfd_open(answer["up"])
-
-    def _close_socket(self) -> None:
-        if self._socket is not None:
-            asyncio.get_running_loop().remove_reader(self._socket)
-            self._socket.close()
 
     def _receive(self) -> None:
         assert self._socket is not None
@@ -89,24 +86,12 @@ class SandboxClient:
         except OSError:
             data = b""
         if data:
-            self._take(json.loads(data))
+            self._on_message(json.loads(data))
             return
         asyncio.get_running_loop().remove_reader(self._socket)
         self.pid = None
-        was_up = self._up is not None and self._up.done()
-        self._resolve({"down": "it ended at once"})
-        if was_up and not self._closing:
+        if not self._closing:
             self._on_lost("the test's sandbox ended unexpectedly")
-
-    def _take(self, message: dict[str, Any]) -> None:
-        if "up" in message or "down" in message:
-            self._resolve(message)
-        else:
-            self._on_message(message)
-
-    def _resolve(self, answer: dict[str, Any]) -> None:
-        if self._up is not None and not self._up.done():
-            self._up.set_result(answer)
 
     def start(self, command: dict[str, Any], output: int) -> None:
         """Starts a process with an output, by a file, as words and variables may be longer than a message."""
@@ -127,13 +112,16 @@ class SandboxClient:
     async def close(self) -> None:
         """Ends everything in the sandbox, and itself."""
         self._closing = True
-        if self._end >= 0 and self._socket is not None:
+        if self._socket is None:
+            return
+        if self._end >= 0:
             self.send({"do": "close"})
-            await asyncio.get_running_loop().run_in_executor(None, self._wait)
+            await asyncio.to_thread(self._wait)
             with contextlib.suppress(OSError):
                 while data := self._socket.recv(MAX_MESSAGE, socket.MSG_DONTWAIT):  # how the last of them ended
-                    self._take(json.loads(data))
-        self._close_socket()
+                    self._on_message(json.loads(data))
+        asyncio.get_running_loop().remove_reader(self._socket)
+        self._socket.close()
 
     def _wait(self) -> None:
         """Returns when the sandbox has ended, which is killed where it does not end by itself."""

@@ -7,8 +7,8 @@ import pytest
 
 from dodo_dsl.outcome import MachineLoad, ServiceUse, Wait
 from dodo_dsl.run.machine_load.meter import (
-    FIRST_PERIOD_S,
     LAST_PATIENCE_S,
+    PERIOD_S,
     Meter,
 )
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
@@ -72,10 +72,10 @@ def test_snapshots_are_taken_from_begin_to_end() -> None:
 
         meter = Meter(take, float, bool)
         meter.begin()
-        await asyncio.sleep(2.5 * FIRST_PERIOD_S)
+        await asyncio.sleep(2.5 * PERIOD_S)
         await meter.end()
-        await asyncio.sleep(9 * FIRST_PERIOD_S)
-        return [time_s / FIRST_PERIOD_S for time_s in times]
+        await asyncio.sleep(9 * PERIOD_S)
+        return [time_s / PERIOD_S for time_s in times]
 
     assert run(scene()) == pytest.approx([0.0, 1.0, 2.0, 2.5])
 
