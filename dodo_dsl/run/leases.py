@@ -81,15 +81,16 @@ def _locked(path: Path, kind: int, *, is_made: bool) -> int | None:
             if not stat.S_ISREG(os.fstat(descriptor).st_mode):
                 raise OSError(errno.EINVAL, "expected a file", str(path))  # noqa: TRY301
             fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
-            if path.exists() and os.path.samestat(os.fstat(descriptor), path.stat()):
-                return descriptor
+            with contextlib.suppress(FileNotFoundError):  # its holder has just removed it
+                if os.path.samestat(os.fstat(descriptor), path.stat()):
+                    return descriptor
         except BlockingIOError:
             os.close(descriptor)
             return None
         except OSError:
             os.close(descriptor)
             raise
-        os.close(descriptor)  # its holder has removed it meanwhile
+        os.close(descriptor)
 
 
 def _said(descriptor: int) -> dict[str, Any]:
