@@ -62,19 +62,30 @@ def _channels() -> Path:
     return Path(tempfile.gettempdir()).resolve() / f"dodo-channels-{os.geteuid()}"
 
 
+def _remove_place() -> None:
+    """Removes the place of all channels, unless a test has one there."""
+    with contextlib.suppress(OSError):
+        _channels().rmdir()
+
+
 @contextlib.contextmanager
 def meeting_place(work: Path, keep: bool) -> Iterator[str]:
     """A folder where the services of a test of the run with a ``work`` folder meet; ``keep`` leaves it."""
-    folder = tempfile.mkdtemp(prefix=f"{work.name}-", dir=secured(_channels()))
+    folder = ""
+    while not folder:
+        with contextlib.suppress(FileNotFoundError):  # another run, which has ended, has just removed the place
+            folder = tempfile.mkdtemp(prefix=f"{work.name}-", dir=secured(_channels()))
     try:
         yield folder
     finally:
         if not keep:
             shutil.rmtree(folder, ignore_errors=True)
+            _remove_place()
 
 
 def _remove(folder: Path, lease: leases.Lease) -> None:
     """Removes a folder; where that fails its record stays, and the next run tries again."""
     for each in (folder, *_channels().glob(f"{folder.name}-*")):
         shutil.rmtree(each, ignore_errors=True)
+    _remove_place()
     lease.leave() if folder.exists() else lease.release()
