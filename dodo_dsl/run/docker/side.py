@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import re
 import signal
 import threading
 from collections.abc import Collection, Iterable, Mapping
@@ -9,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from docker.errors import DockerException
+from docker.errors import APIError, DockerException
 
 from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.model import FILES, SANDBOX
@@ -37,6 +38,8 @@ _MEMORY_S = 1.0
 _COPY_S = 600.0
 """The longest that copies of the repository's files may take."""
 _OUTPUT_S = 2.0
+_TOO_SLOW = re.compile("failed to create shim.*context deadline exceeded")
+"""In the error of an engine that was too busy to start a container; it may try again."""
 
 
 class ContainerSide:
@@ -239,14 +242,17 @@ class ContainerSide:
         if why and name not in self._watched.may_be_ill:
             self._watched.tell(Unstartable(name, why))
 
-    def _start_container(self, name: str) -> Any:
-        """Starts a container; what it prints."""
+    def _start_container(self, name: str, again: bool = False) -> Any:
+        """Starts a container, if need be twice; what it prints."""
         printed = attached(self._containers[name])  # before its start, because it may end at once
         try:
             self._containers[name].start()
-        except (DockerException, OSError):
+        except APIError as error:
             close(printed)
-            raise
+            if again or not _TOO_SLOW.search(engine_error(error)):
+                raise
+            self._note(f"the container of '{name}' is started once more: {engine_error(error)}")
+            return self._start_container(name, again=True)
         return printed
 
     async def listeners(self) -> Collection[str] | None:

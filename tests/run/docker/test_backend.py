@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
+from docker.errors import APIError
 
 from dodo_dsl.plan.model import Application, ApplicationService, Flag
 from dodo_dsl.run.docker.compose import Compose
@@ -34,13 +35,15 @@ def test_a_crash_upon_the_end_is_reported(tmp_path: Path) -> None:
 
 
 class Container:
-    """One with a health check that the engine never asks."""
+    """One that starts after ``problems``, with a health check that the engine never asks."""
 
-    def __init__(self) -> None:
-        self.attrs: dict[str, Any] = {"Config": {"Healthcheck": {"Test": ["CMD", "false"]}}}
+    def __init__(self, *problems: str, config: str = "Config") -> None:
+        self.problems = [*problems]
+        self.attrs: dict[str, Any] = {config: {"Healthcheck": {"Test": ["CMD", "false"]}}}
 
     def start(self) -> None:
-        """It runs."""
+        if self.problems:
+            raise APIError("", None, self.problems.pop(0))
 
     def attach_socket(self, **_: object) -> Any:
         ours, theirs = socket.socketpair()
@@ -48,7 +51,7 @@ class Container:
         return SimpleNamespace(_sock=ours, _response=ours)
 
 
-def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] = ()) -> Any:
+def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] = (), **others: Container) -> Any:
     """What is awaited of an application, and what is reported, of one that waits for another one's health."""
     services = (ApplicationService("app", after={"db": "service_healthy"}, optional=optional), ApplicationService("db"))
 
@@ -56,7 +59,7 @@ def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] 
         watched = WatchedServices(plan("t", application=Application(".", services)), folder, folder)
         has_check = SimpleNamespace(has_healthcheck=lambda _: True, project="dodo-t", say=print)
         side = ContainerSide(watched, cast(Compose, has_check), NOBODY, NOBODY, [])
-        side._containers = {"app": Container(), "db": Container()}
+        side._containers = {"app": Container(), "db": Container(), **others}
         waits = await side.start("application")
         for name, status in statuses:
             side._take(name, f"health_status: {status}", {})
@@ -83,6 +86,16 @@ def test_an_optional_service_need_not_be_healthy(tmp_path: Path) -> None:
     waits, events = in_turn(tmp_path, ("db", "unhealthy"), ("app", "healthy"), optional=("db",))
     assert waits == {"app": True, "db": False}
     assert [type(event) for event in events] == [Ready, Noted], events
+
+
+SLOW, BAD = "failed to create shim task: io pipe: context deadline exceeded", "failed to create shim task: no such file"
+
+
+@pytest.mark.parametrize("problems", [(SLOW,), (SLOW, SLOW), (BAD,)])
+def test_what_a_busy_engine_does_not_start_is_started_once_more(problems: tuple[str, ...], tmp_path: Path) -> None:
+    events = in_turn(tmp_path, ("db", "healthy"), ("app", "healthy"), app=Container(*problems))[1]
+    notes = [Noted(f"the container of 'app' is started once more: {SLOW}")] * (problems[0] == SLOW)
+    assert events[2:] == [*notes, *[Unstartable("app", problems[-1])] * (problems != (SLOW,))]
 
 
 def test_the_camera_of_a_raspberry_pi_is_refused() -> None:
