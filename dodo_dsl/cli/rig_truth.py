@@ -66,7 +66,7 @@ def make(options: argparse.Namespace, deployment: Deployment, rig: Rig, say: Cal
     if not boxes:
         raise UsageError("the camera sees no object of the scene")
     images = [{"id": 1, "file_name": picture.name, "width": width, "height": height}]
-    atomic.write_text(output, DataSet(images, boxes).text())
+    atomic.write_text(output, DataSet(images, boxes).text({name for _, (name, _) in boxes}))
     return f"{output}: {len(boxes)} boxes in {width} x {height} pixels; {picture} shows the scene"
 
 

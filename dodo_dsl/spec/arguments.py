@@ -173,8 +173,8 @@ def _path(parameter: Parameter, node: Node, root: Path) -> Value:
         hint = "the files of a test must be in its registry: copy them there"
         raise ValueProblem(parameter, node, "path-escape", f": '{text}' leaves the registry", hint)
     if not target.exists():
-        hint, fix = near_path(text, folder, root)
-        raise ValueProblem(parameter, node, "missing-file", f": there is no file or folder '{text}'", hint, fix)
+        hint = near_path(text, folder, root)
+        raise ValueProblem(parameter, node, "missing-file", f": there is no file or folder '{text}'", hint)
     if not target.is_file() and not target.is_dir():
         what = f": '{text}' is a pipe or a device, expected a file or a folder"
         raise ValueProblem(parameter, node, "unreadable-file", what)

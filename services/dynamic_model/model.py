@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from msgspec.structs import replace
-
 from dodo_dsl.opendlv.assets.car import KIWI, Car
 from dodo_dsl.opendlv.envelope import MICROSECONDS
 

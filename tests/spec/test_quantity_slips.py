@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from dodo_dsl.spec.quantity import UNITS, QuantityError, convert
 
+
 @pytest.mark.parametrize(("text", "unit", "meant"), [("10 hz", "Hz", "Hz"), ("1gb", "B", "GB"), ("1 kb", "B", "kB")])
 def test_a_unit_in_other_letters_is_named(text: str, unit: str, meant: str) -> None:
     with pytest.raises(QuantityError) as problem:

@@ -76,8 +76,6 @@ def read(path: Path, frames: Frames) -> dict[int, list[tuple[str, Area]]]:
     return {keys[number]: found for number, found in boxes.items()}
 
 
-
-
 def no_box(name: str, labels: Collection[str]) -> str:
     """What to say of a class that none of the boxes has; ``labels`` are theirs."""
     close = difflib.get_close_matches(name, labels, n=1)
