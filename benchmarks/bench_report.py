@@ -1,7 +1,7 @@
 """How large the pages of a report are, and how soon Chromium shows them: python benchmarks/bench_report.py.
 
 The suite page has 20, 100 and 1,000 tests, of which all failed, each tenth in the same way, as failed ones take the
-most room; each has eight checks with twenty earlier runs. The drive's page is of 60 s with a frame of 640x480 each
+most room; each has eight checks. The drive's page is of 60 s with a frame of 640x480 each
 100 ms. "Shown" is from the start of the navigation to the first image on the screen after everything is loaded.
 """
 
@@ -22,7 +22,6 @@ from benchmarks.ledger.budget import Budget
 from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, report
 from dodo_dsl.opendlv.video import VideoEncoder
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.report import overview
 from dodo_dsl.report.report_folder import write_summaries
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import PROGRAM, Chromium
@@ -32,7 +31,7 @@ LARGEST = {100: 1.0}
 """MB that the page of so many tests may have."""
 SLOWEST = {1000: 1.0}
 """Seconds until the page of so many tests is shown."""
-RUNS, CHECKS = 20, tuple(drives.check(f"check-{n}", 0.5 + n / 20, False, "m", max=0.4) for n in range(8))
+CHECKS = tuple(drives.check(f"check-{n}", 0.5 + n / 20, False, "m", max=0.4) for n in range(8))
 DRIVE_S, FPS, WIDTH, HEIGHT = 60, 10, 640, 480
 NO_BROWSER = "Chromium is not here"
 _SHOWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(performance.now()))))"
@@ -51,7 +50,6 @@ def suites(folder: Path) -> Iterator[tuple[int, Path]]:
         failures.missed_cones, failures.set_up_failed, failures.false_detections, failures.interrupted,
         failures.rig_refused,
     )  # fmt: skip
-    rng = np.random.default_rng(1)
     made = [replace(drives.outcome_of(kind(), "test"), checks=CHECKS) for kind in kinds]
     for size in SIZES:
         place = folder / str(size)
@@ -59,10 +57,6 @@ def suites(folder: Path) -> Iterator[tuple[int, Path]]:
         outcomes: list[Outcome] = [
             replace(made[n % len(made)], name=f"{made[n % len(made)].name}-{n}", slug=f"test-{n}") for n in range(size)
         ]
-        values = rng.uniform(0, 1, (size, RUNS, len(CHECKS))).tolist()
-        names = [check["name"] for check in CHECKS]
-        runs = [[{"outcome": "passed", "checks": dict(zip(names, run, strict=True))} for run in v] for v in values]
-        overview.write_history(place, {o.slug: r for o, r in zip(outcomes, runs, strict=True)})
         write_summaries(place, outcomes)
         yield size, place / "index.html"
 

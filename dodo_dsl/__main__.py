@@ -7,8 +7,6 @@ import os
 import sys
 
 CLOSED = 3
-_COMPLETES = "_ARGCOMPLETE"
-"""Set by a shell that asks how a command line may go on."""
 
 
 def run() -> None:
@@ -16,10 +14,13 @@ def run() -> None:
         sys.exit(_refuse_closed())
     if sys.getfilesystemencoding() != "utf-8":
         _start_again_in_utf8()
-    if _COMPLETES in os.environ:
-        from dodo_dsl.cli.completion import answer
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks how a command line may go on
+        import argcomplete
 
-        answer()
+        from dodo_dsl.cli.main import parser
+
+        called = os.environ.get("COMP_LINE", "").split()[1:2]
+        argcomplete.autocomplete(parser(called), always_complete_options=False)
     if sys.argv[1:2] == ["run"]:
         from dodo_dsl.cli.loading import begin
 

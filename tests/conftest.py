@@ -103,8 +103,8 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 @pytest.fixture(autouse=True, scope="session")
-def own_history(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Runs of tests are no part of this user's history."""
+def own_state(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Runs of tests are no part of this user's history, and put no rig into quarantine."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("DODO_RIGS", str(tmp_path_factory.mktemp("rigs")))
         patch.setenv("DODO_HISTORY", str(tmp_path_factory.mktemp("state") / "history.jsonl"))

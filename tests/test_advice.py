@@ -1,15 +1,12 @@
 """All advice in messages, typed: what a message tells users to type exists, and takes the problem away.
 
-``test_what_texts_name_exists`` reads every text of the sources, so that no advice is forgotten. Advice that depends on
-the machine is typed in the situation in which it is shown.
+``test_what_texts_name_exists`` reads every text of the sources, so that no advice is forgotten.
 """
 
 import argparse
 import ast
 import functools
-import os
 import re
-import sysconfig
 import tomllib
 from collections.abc import Iterator
 from importlib import metadata
@@ -64,8 +61,7 @@ def test_what_texts_name_exists() -> None:
                 assert (ROOT / "scripts" / name).is_file(), (path, text)
             for name in _MAKE.findall(text) if "checkout" in text else ():
                 assert f"\n{name}:" in targets, (path, text)
-            assert not re.search(r"install .*dodo-dsl", text), (path, "it is on no index")
-            assert "pip install" not in text or path.suffix != ".py" or path.name == "video.py", path
+            assert "pip install" not in text or path.suffix != ".py" or path.name in ("advice.py", "video.py"), path
 
 
 @pytest.mark.thorough
@@ -80,33 +76,8 @@ def test_extras_are_those_of_the_project() -> None:
     assert not extras
 
 
-@pytest.mark.parametrize(("checkout", "expected"), [(ROOT, [f"{ROOT}[mcap]"]), (None, ["mcap", "foxglove"])])
-def test_pip_gets_the_checkout_with_the_extra_or_else_its_packages(
-    checkout: Path | None, expected: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(advice, "_installed_from", lambda: checkout)
-    command = advice.install("mcap")
-    assert all(word in command for word in expected) and "scipy" not in command
-    may = os.access
-    monkeypatch.setattr(os, "access", lambda path, mode: path != sysconfig.get_path("purelib") and may(path, mode))
-    monkeypatch.setattr(os, "geteuid", lambda: 1000)
-    assert advice.install("mcap") == f"sudo {command}"
-
-
-def test_an_engine_that_does_not_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each way out is for one reason: a remote engine, the group of the socket, no engine, one that is not started."""
-    socket = tmp_path / "docker.sock"
-    monkeypatch.setattr(advice, "_SOCKET", socket)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+def test_an_engine_elsewhere_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DOCKER_HOST", raising=False)
-    assert advice.engine() == advice.docker()
-    (tmp_path / "dockerd").touch(0o755)
-    assert advice.engine() in {"sudo systemctl start docker", "sudo dockerd"}
-    socket.touch(0o660)
-    monkeypatch.setattr(os, "access", lambda path, _: path != socket)
-    monkeypatch.setattr(Path, "stat", lambda path, **_: os.stat_result((0o140660, 0, 0, 0, 0, 12, 0, 0, 0, 0)))
-    assert re.fullmatch(r"sudo usermod --append --groups \w+ \w+, and log in again", advice.join(socket))
-    monkeypatch.undo()
+    assert advice.DOCKER in advice.engine()
     monkeypatch.setenv("DOCKER_HOST", "tcp://10.0.0.1")
-    assert "unset DOCKER_HOST" in advice.engine()
+    assert "DOCKER_HOST is tcp://10.0.0.1" in advice.engine()

@@ -1,4 +1,4 @@
-"""The table that a terminal shows while tests run: a line for each, with its phase, its own time and how fast it is."""
+"""The table that a terminal shows while tests run: a line for each, with its phase and how long that has lasted."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -9,9 +9,8 @@ from rich.progress import Progress as Bars
 from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from dodo_dsl.cli.progress import NoProgress, about, count, ending
+from dodo_dsl.cli.progress import NoProgress, count, ending
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.run.run_state import Standing
 from dodo_dsl.terminal import printable, unescaped
 
 _STYLES = {"passed": "green", "failed": "red", "error": "yellow"}
@@ -33,13 +32,12 @@ class LiveProgress(NoProgress):
     """A line for each running test; those that did not pass stand above. Texts of services are never rich's markup."""
 
     def __init__(self, stream: TextIO, slugs: Sequence[str]) -> None:
-        self._width = max(map(len, slugs), default=0)
+        self._width, self._all = max(map(len, slugs), default=0), len(slugs)
         self._progress: Any = _Bars(
             SpinnerColumn(),
             TextColumn("{task.description}", markup=False),
             TextColumn("{task.fields[state]}", markup=False),
             TimeElapsedColumn(),
-            TextColumn("{task.fields[standing]}", markup=False),
             console=Console(file=unescaped(stream)),
             transient=True,
         )
@@ -59,13 +57,7 @@ class LiveProgress(NoProgress):
     def phase(self, slug: str, text: str) -> None:
         if slug in self._tasks:
             self._progress.remove_task(self._tasks[slug])
-        fields = {"state": printable(text), "standing": ""}
-        self._tasks[slug] = self._progress.add_task(slug, total=None, **fields)
-
-    def standing(self, slug: str, standing: Standing) -> None:
-        own = f"{standing.seconds:.1f} s of test time" if standing.is_lockstep else ""
-        if slug in self._tasks:
-            self._progress.update(self._tasks[slug], standing=own)
+        self._tasks[slug] = self._progress.add_task(slug, total=None, state=printable(text))
 
     def done(self, outcome: Outcome) -> None:
         self._ended[outcome.outcome] += 1
@@ -75,7 +67,5 @@ class LiveProgress(NoProgress):
             self._progress.console.print(Text.assemble(name, verdict, ending(outcome)))
         if (task := self._tasks.pop(outcome.slug, None)) is not None:
             self._progress.remove_task(task)
-
-    def rest(self, seconds: float, tests: int) -> None:
         ended = "".join(f"{self._ended[kind]} {word}, " for kind, word in _WORDS.items() if self._ended[kind])
-        self._progress.rest = f"{ended}{count(tests)} to go, {about(seconds)}"
+        self._progress.rest = f"{ended}{count(self._all - self._ended.total())} to go"

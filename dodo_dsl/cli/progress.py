@@ -8,7 +8,6 @@ from dodo_dsl.cli import display
 from dodo_dsl.cli.display import Verbosity
 from dodo_dsl.outcome import ON_EMULATED, Outcome
 from dodo_dsl.plan.model import LAYERS
-from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.runner import Progress
 from dodo_dsl.terminal import printable
 
@@ -34,11 +33,7 @@ class NoProgress:
 
     def phase(self, slug: str, text: str) -> None: ...
 
-    def standing(self, slug: str, standing: Standing) -> None: ...
-
     def done(self, outcome: Outcome) -> None: ...
-
-    def rest(self, seconds: float, tests: int) -> None: ...
 
 
 class PlainProgress(NoProgress):
@@ -66,9 +61,6 @@ class PlainProgress(NoProgress):
     def _head(self, slug: str) -> str:
         """The start of a line about a test."""
         return f"[{time.monotonic() - self.start:6.1f} s] {printable(slug):<{self.width}}  "
-
-    def rest(self, seconds: float, tests: int) -> None:
-        self.note(f"[{time.monotonic() - self.start:6.1f} s] {count(tests)} to go, {about(seconds)}")
 
 
 def count(number: int, what: str = "test") -> str:

@@ -20,7 +20,7 @@ EXAMPLES = """examples:
   dodo report dodo-report            index.html, junit.xml and metrics.txt from its results.json
   dodo report jobs/* -o joined       the reports of several jobs as one, with all their files
   dodo report --gitlab -o joined     in a job of GitLab: those of the child pipelines' jobs, from its API
-  dodo report --against ../main/dodo-report    what changed since that report, also on the page and in changes.md
+  dodo report --against ../main/dodo-report    what changed since that report, also on the page
 
 exit codes: 0 drawn, 2 wrong usage or no report; with --against 1 some tests failed, 3 some ended in error
 """
@@ -48,12 +48,9 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         output = options.output or (REPORT if options.gitlab else None)
         reports = [*map(read_given, folders), *fetched]
         target, outcomes = _drawn(reports, output, stdout)
-    from dodo_dsl.report.join import write_other_paths
-
     comparison = compare(outcomes, other) if other else None
     circumstances = results.joined(reports)
     write_summaries(target, outcomes, circumstances, comparison)
-    write_other_paths(target, comparison, other)
     if comparison:
         stdout.writelines(f"{line}\n" for line in change_lines(comparison))
     stdout.write(f"report: {target / 'index.html'}\n")

@@ -12,22 +12,23 @@ from typing import TextIO, cast
 from dodo_dsl.cli import display, progress, run_report, selection
 from dodo_dsl.cli.display import Verbosity, chatter
 from dodo_dsl.cli.errors import Exit, UsageError, of_outcomes
-from dodo_dsl.cli.forecast import at_once, expectation, run_forecast
 from dodo_dsl.cli.loading import loading
 from dodo_dsl.cli.numbers import positive, seconds, seed, shard
 from dodo_dsl.cli.provenance import Origin, origin, recording
 from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.run_jobs import prepare
-from dodo_dsl.cli.run_report import drawable, save_report
+from dodo_dsl.cli.run_report import save_report
 from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors, signals_interrupt, undisturbed
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report.next_report import next_report
-from dodo_dsl.report.repetitions import Repeated, repeated
+from dodo_dsl.report.overview import Past
+from dodo_dsl.report.repetitions import repeated
 from dodo_dsl.report.report_folder import draw_test
 from dodo_dsl.report.results import Circumstances, GivenReport
 from dodo_dsl.run.backends import COMBINATIONS, CombinedBackends, Job
+from dodo_dsl.run.history import History, typical_s
 from dodo_dsl.run.process.fork_server import ForkServer
 from dodo_dsl.run.process.side import may_enter
 from dodo_dsl.run.protocol import BackendError
@@ -37,6 +38,9 @@ from dodo_dsl.run.work_folder import WorkFolder, reap_folders, work_folder
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.model import CLOCKS, LEVELS
 from dodo_dsl.terminal import printable
+
+_LATEST = 20
+"""Runs of a test that its page shows."""
 
 
 def choose_backend(plans: Sequence[Plan]) -> BackendName:
@@ -76,7 +80,6 @@ EXAMPLES = """examples:
   dodo run 'sil-*' --repeat 20 --fail-fast     how often they pass, until one does not
   dodo run sil-closed-straight --repeat 2      in lockstep: whether both runs have the same values
   dodo run sil-closed-straight --samples 16    at 16 values of its ranges, the same ones for each --seed
-  dodo run sil-closed-straight --watch         again whenever spec, map or application is saved
   dodo run -q                                  only what did not pass, and the counts
   dodo run --shard 2/4                         the second of four parts, for jobs that share the tests
   dodo run --compiled generated/sil-closed-straight --report dodo-report
@@ -124,12 +127,10 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--compiled", type=Path, action="append", default=[], metavar="DIR/SLUG",
                         help="folder of a compiled test; repeatable")  # fmt: skip
     parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to inspect it")
-    parser.add_argument("--watch", action="store_true",
-                        help="repeat, in lockstep, what a saved file affects, and show what changed")  # fmt: skip
     display.add_verbosity(
         parser,
         "print only what did not pass, and a last line with the counts",
-        "print each test's phases, sentence, checks, what the application used, and errors and warnings in logs",
+        "print each test's phases, sentence, checks, and what the application used",
     )
     selection.add_application(parser)
 
@@ -143,10 +144,6 @@ def _main(options: argparse.Namespace, stdout: TextIO) -> int:
     more_descriptors()
     stdout = cast(TextIO, UninterruptedStream(stdout))
     reap_folders()
-    if options.watch:
-        from dodo_dsl.cli import watch
-
-        return watch.main(options, stdout)
     with work_folder() as folder, loading(options) as server:
         with chatter(stdout, options.verbosity) as quietly:
             jobs, deployment = prepare(options, folder.path, quietly)
@@ -159,12 +156,14 @@ def _main(options: argparse.Namespace, stdout: TextIO) -> int:
         gc.enable()
         source, said = origin(options, deployment), options.verbosity
         is_part = bool(options.test or options.level or options.compiled or options.shard != (1, 1))
-        others = run_report.earlier(options.report, [job.plan.name for job in jobs]) if is_part else None
+        registry = () if options.compiled else deployment.registry
+        names = [job.plan.name for job in jobs]
+        others = run_report.earlier(options.report, names, registry) if is_part else None
         outcomes, is_reported, repeats = run(runner, jobs, options.report, stdout, source, others, said)
         if runner.kept:
             stdout.write("\n".join(["", *runner.kept, ""]))
             folder.kept = True
-    differs = Exit.PROBLEMS if any(each.differing for each in repeats) else Exit.OK
+    differs = Exit.PROBLEMS if any(repeats.values()) else Exit.OK
     return max(_exit_code(outcomes, runner.interrupted), differs, Exit.OK if is_reported else Exit.ERROR)
 
 
@@ -186,9 +185,13 @@ def runner_of(
 ) -> Runner:
     plans = [job.plan for job in jobs]
     backend = options.backend or choose_backend(plans)
-    order = schedule(options.jobs, expectation(backend))
-    stdout.write(f"{progress.count(len(jobs))}, {at_once(order, jobs)}, {backend} backend; ")
-    stdout.write(f"{run_forecast(order, jobs, backend)}\n")
+    history = History()
+    order = schedule(options.jobs, lambda j: typical_s(history.of(j.plan.spec, j.test, backend, j.plan.clock)))
+    estimate = order.estimate(jobs)
+    most = max(1, min(order.capacity // min(order.need(job) for job in jobs), len(jobs)))
+    at_once = f"{'up to ' * (len(jobs) > 1)}{most} at a time"
+    stdout.write(f"{progress.count(len(jobs))}, {at_once}, {backend} backend")
+    stdout.write("\n" if estimate is None else f"; {progress.about(estimate)}\n")
     shown = progress.choose(stdout, [p.slug for p in plans], options.verbosity)
     _require_possible(options, backend, plans)
     cids, nets, held = deployment.cids, subnets(deployment.subnets), (folder.lease.descriptor,)
@@ -216,8 +219,8 @@ def run(
     source: Origin,
     others: GivenReport | None = None,
     said: Verbosity = Verbosity.NORMAL,
-) -> tuple[list[Outcome], bool, Sequence[Repeated]]:
-    """The outcomes, whether the report holds all of them, and repetitions; they are printed in any case.
+) -> tuple[list[Outcome], bool, dict[str, list[str]]]:
+    """The outcomes, whether the report holds all of them, and what differs between repetitions; all are printed.
 
     ``others`` are tests that did not run again and stay in the report.
     """
@@ -228,33 +231,37 @@ def run(
         with ThreadPoolExecutor(1, "drawing") as pool, runner.progress:  # beside the tests that still run
 
             def draw(job: Job, outcome: Outcome) -> None:
-                drawn.append(pool.submit(draw_test, target.folder, outcome, drawable(job)))
+                drawn.append(pool.submit(draw_test, target.folder, outcome, job.plan, job.folder))
 
             outcomes = asyncio.run(runner.run(jobs, draw))
         not_run = runner.not_run()
         plans = {job.plan.slug: job.plan for job in jobs}
         about = {s: run_report.Reported(p, target.folder / s, report / s) for s, p in plans.items()}
-        run_report.write_summary(stdout, outcomes, {job.plan.slug: job.test for job in jobs}, not_run, said, about)
+        run_report.write_summary(stdout, outcomes, not_run, said, about)
         ran = {job.plan.slug: job for job in jobs}
         repeats = repeated((ran[o.slug].folder, o, ran[o.slug].report) for o in outcomes)
-        told = (each for each in repeats if each.differing or said is not Verbosity.QUIET)
-        stdout.writelines(f"{printable(line)}\n" for each in told for line in each.lines())
+        for slug, lines in repeats.items():
+            if lines or said is not Verbosity.QUIET:
+                same = "differ" if lines else "have the same values"
+                stdout.write(f"{slug}: the runs in lockstep {same}\n")
+                stdout.writelines(f"        {printable(line)}\n" for line in lines)
         stdout.flush()
         with undisturbed():
-            circumstances = Circumstances((record(),), tuple(not_run), tuple(repeats))
-            written = save_report(
-                target,
-                report,
-                jobs,
-                outcomes,
-                others,
-                circumstances,
-                [problem for each in drawn for problem in each.result()],
-            )
-    stdout.writelines(f"{printable(problem)}\n" for problem in written.problems)
-    if said is not Verbosity.QUIET or not written.is_whole:
-        stdout.write(f"{written.sentence}\n")
-    return outcomes, written.is_whole, repeats
+            circumstances = Circumstances((record(),), tuple(not_run))
+            problems = [problem for each in drawn for problem in each.result()]
+            sentence, is_whole = save_report(target, report, outcomes, others, circumstances, _past(jobs, outcomes))
+    stdout.writelines(f"{printable(problem)}\n" for problem in problems)
+    if said is not Verbosity.QUIET or not is_whole:
+        stdout.write(f"{sentence}\n")
+    return outcomes, is_whole, repeats
+
+
+def _past(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> Past:
+    """The latest runs of these tests, whose outcomes are added to them."""
+    history, tests = History(), {job.plan.slug: job.test for job in jobs}
+    history.add((tests[o.slug], o) for o in outcomes)
+    latest = {o.slug: history.of(o.spec, tests[o.slug], o.backend, o.clock)[-_LATEST:] for o in outcomes}
+    return {slug: [(run.outcome, run.in_words()) for run in runs] for slug, runs in latest.items()}
 
 
 def _exit_code(outcomes: Sequence[Outcome], interrupted: bool) -> Exit:

@@ -11,7 +11,6 @@ from dodo_dsl import compiler
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.display import write_diagnostics
 from dodo_dsl.cli.errors import UsageError
-from dodo_dsl.cli.forecast import expectation
 from dodo_dsl.cli.loading import loading
 from dodo_dsl.cli.numbers import positive, seed
 from dodo_dsl.cli.progress import NoProgress
@@ -75,7 +74,7 @@ class SearchSession:
             "process", deployment.cids, isolation=options.isolation,
             descriptors=(self.folder.lease.descriptor,), fork_server=self.server,
         )  # fmt: skip
-        order = schedule(options.jobs, expectation(backends.name))
+        order = schedule(options.jobs)
         progress = _Lines(self.stdout)
         return Drives(study.checked, store, KeptBackends(backends), order, self.folder.path, progress, folder, shared)
 

@@ -17,7 +17,7 @@ class DockerError(Exception):
 def _docker() -> str:
     path = shutil.which("docker")
     if path is None:
-        raise DockerError(f"the docker command is missing: {advice.docker()}")
+        raise DockerError(f"the docker command is missing: {advice.DOCKER}")
     return path
 
 

@@ -11,12 +11,8 @@ from dodo_dsl.report import results
 from dodo_dsl.spec.matrix import SLUG
 
 PAGE, DATA = "drive.html", "drive.js"
-BEFORE = "before.js"
-"""The path of the same test in another report, where they are compared."""
 SHARED = "_viewer"
 """The folder of scripts and style for the pages of all tests; no test's folder begins with an underscore."""
-FAILED, FAILED_VARIABLE = "failed.js", "dodoFailed"
-"""Slug, name and outcome of each test of the report that did not pass and has a page, for steps between them."""
 LOGS, ATTEMPTS = "logs", "attempts"
 VIDEOS = tuple(f"camera-{number}.mp4" for number in range(4))
 """Of the cameras of a test."""
@@ -51,7 +47,7 @@ def _forget_test(place: Path) -> None:
     for name in (LOGS, ATTEMPTS):
         with contextlib.suppress(OSError):
             (place / name).unlink() if (place / name).is_symlink() else shutil.rmtree(place / name)
-    for name in (*_MADE, PAGE, DATA, BEFORE):
+    for name in (*_MADE, PAGE, DATA):
         (place / name).unlink(missing_ok=True)
     with contextlib.suppress(OSError):  # there is none, or it holds what others put there
         place.rmdir()

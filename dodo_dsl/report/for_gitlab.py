@@ -4,12 +4,12 @@ In JUnit failed is a failure, error an error, the class name is the level. The m
 compares between branches.
 """
 
+import io
 import json
 import math
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from dodo_dsl.outcome import NotRun, Outcome, worst_margin
@@ -24,61 +24,59 @@ _ATTACHMENT = "[[ATTACHMENT|"
 """What GitLab takes a file by, wherever it stands in a test's output: text of others has another."""
 
 
-def write_junit(
-    path: Path,
+def junit(
     outcomes: Sequence[Outcome],
     attachments: Mapping[str, str],
     links: Mapping[str, str],
     not_run: Sequence[NotRun] = (),
     runs: Sequence[RunRecord] = (),
-) -> None:
-    """Writes ``junit.xml``; ``attachments`` and ``links`` are pictures and pages by slug, from the working folder.
+) -> bytes:
+    """``junit.xml``; ``attachments`` and ``links`` are pictures and pages by slug, from the working folder.
 
     Tests that were ``not_run`` are skipped ones; date and host are those of the run, if it is one of ``runs`` alone.
     """
-    from junitparser import JUnitXml, TestSuite
+    from junitparser import JUnitXml, Skipped, TestSuite
 
     suite = TestSuite("dodo")
     if len(runs) == 1:
         suite.timestamp = runs[0].date.partition("+")[0]
         suite.hostname = xml_text(runs[0].host)
     cases = [_case(outcome, attachments.get(outcome.slug), links.get(outcome.slug)) for outcome in outcomes]
-    suite.add_testcases([*cases, *map(_skipped, not_run)])  # one by one, each is counted with all before it
+    for test in not_run:
+        cases.append(_named(test))
+        cases[-1].result = [Skipped(xml_text(f"not run: {test.reason}"))]
+    suite.add_testcases(cases)  # one by one, each is counted with all before it
     document = JUnitXml("dodo")
     document.add_testsuite(suite)
     document.update_statistics()  # type: ignore[no-untyped-call]
-    document.write(str(path), pretty=True)
+    document.write(content := io.BytesIO(), pretty=True)
+    return content.getvalue()
+
+
+def _named(test: Outcome | NotRun) -> Any:
+    from junitparser import TestCase
+
+    case = TestCase(xml_text(test.name), classname=test.level)
+    case._elem.set("file", xml_text(test.spec))
+    return case
 
 
 def _case(outcome: Outcome, attachment: str | None, link: str | None) -> Any:
-    from junitparser import Error, Failure, TestCase
+    from junitparser import Error, Failure
 
-    case = TestCase(xml_text(outcome.name), classname=outcome.level, time=round(outcome.execution_s or 0.0, 3))
-    case._elem.set("file", xml_text(outcome.spec))
+    case = _named(outcome)
+    case.time = round(outcome.execution_s or 0.0, 3)
     if outcome.outcome != "passed":
-        kind = Failure if outcome.outcome == "failed" else Error
-        result = kind(_plain(outcome.reason), outcome.outcome)
+        result = (Failure if outcome.outcome == "failed" else Error)(_plain(outcome.reason), outcome.outcome)
         replay = [f"replay: {link}"] if link else []
         result.text = _plain("\n".join([outcome.reason, *replay, *outcome.last_lines]))
         case.result = [result]
     # GitLab shows the text of a failure in place of this, and takes the attachment from here
-    said = [checks.check_line(check, outcome.checks) for check in outcome.checks] + [
-        f"note: {note}" for note in outcome.notes
-    ]
-    lines = [_plain(line) for line in said]
-    if attachment:
-        lines.append(f"{_ATTACHMENT}{attachment}]]")
+    lines = [checks.check_line(check, outcome.checks) for check in outcome.checks]
+    lines = [_plain(line) for line in [*lines, *(f"note: {note}" for note in outcome.notes)]]
+    lines += [xml_text(f"{_ATTACHMENT}{attachment}]]")] if attachment else []
     if lines:
-        case.system_out = xml_text("\n".join(lines))
-    return case
-
-
-def _skipped(test: NotRun) -> Any:
-    from junitparser import Skipped, TestCase
-
-    case = TestCase(xml_text(test.name), classname=test.level)
-    case._elem.set("file", xml_text(test.spec))
-    case.result = [Skipped(xml_text(f"not run: {test.reason}"))]
+        case.system_out = "\n".join(lines)
     return case
 
 

@@ -1,8 +1,8 @@
-"""The instances of a matrix beside each other: a grid of parameters, in which one check is compared."""
+"""The instances and repetitions of a test together: how many passed, and which came closest to failing."""
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -10,123 +10,101 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import checks
 from dodo_dsl.report.checks import Check
 
-_CHOICE = re.compile(r"(?P<before>.*)\[(?P<choice>[^\[\]]+)\]")
+_URGENCIES = ("failed", "error", "passed")
+_CHOICE = re.compile(r"\[([^\[\]]+)\]")
 _NEXT = re.compile(r",(?=[a-z][a-z0-9-]*=)")
-_LONGEST_NAME = 1000
 _MOST_GAPS = 4
-"""Cells an outcome, of which a part may be empty if not all instances ran."""
-_REPETITIONS = ("run", "report")
-"""Dimensions whose first value is not written: ``--repeat`` and joined reports."""
+"""Cells an outcome, of which a part is empty if not all instances ran."""
 
 
-class GridRow(NamedTuple):
-    """The values of all dimensions but the column's, and the outcomes of each column."""
+def urgency(outcome: Outcome) -> int:
+    """0 for what is looked at first."""
+    return _URGENCIES.index(outcome.outcome)
 
+
+class Grid(NamedTuple):
+    """Outcomes by parameters: those of ``names`` are the rows, ``column`` the columns, empty if there is but one."""
+
+    names: Sequence[str]
+    column: str
     values: Sequence[str]
-    cells: Sequence[Sequence[Outcome]]
+    """Of the columns."""
+    rows: Mapping[tuple[str, ...], Mapping[str, Sequence[Outcome]]]
+    """Each row's values, and its outcomes by the value of the column."""
 
 
 @dataclass(frozen=True)
-class MatrixGrid:
-    """A test's instances; ``column`` is the dimension of the columns, empty if there is but one dimension."""
+class Family:
+    """All instances and repetitions of one test; many tests have but one."""
 
     name: str
-    dimensions: Sequence[str]
-    column: str
-    columns: Sequence[str]
-    rows: Sequence[GridRow]
-
-
-def grids(outcomes: Sequence[Outcome]) -> list[MatrixGrid]:
-    """A grid a matrix with two instances or more, in the order of the outcomes."""
-    found: dict[str, list[tuple[dict[str, str], Outcome]]] = defaultdict(list)
-    for outcome in outcomes:
-        name, choice = _parted(outcome.name)
-        found[name].append((choice, outcome))
-    return [grid for name, instances in found.items() for grid in _grid(name, instances)]
-
-
-class Compared(NamedTuple):
-    """The instances of a ``test`` by one check, the ``worst`` of them, and how many passed."""
-
-    test: str
-    check: str
-    worst: Outcome
-    passed: int
-    number: int
+    outcomes: Sequence[Outcome]
 
     @property
-    def choice(self) -> str:
-        """``[light=dark]``"""
-        return self.worst.name.removeprefix(self.test)
+    def urgency(self) -> int:
+        return min(map(urgency, self.outcomes))
 
-    def of(self, outcome: Outcome) -> Check | None:
-        """The check of an instance, None if it has none."""
-        return _check(outcome, self.check)
+    def count(self, kind: str) -> int:
+        """How many of its tests have an outcome."""
+        return sum(o.outcome == kind for o in self.outcomes)
+
+    def worst(self) -> tuple[Outcome, Check] | None:
+        """The one closest to failing with the check by which it is, of those that all have with a limit.
+
+        The check is the test's headline, or else the one by which an instance is closest to failing.
+        """
+        judged = [outcome for outcome in self.outcomes if outcome.outcome != "error"]
+        each = [(outcome, check) for outcome in judged for check in outcome.checks]
+        names = {check["name"] for _, check in each if checks.share(check)}
+        names -= {check["name"] for outcome, check in each if checks.only_follows(check, outcome.checks)}
+        names = {name for name in names if all(check_of(outcome, name) for outcome in judged)}
+        if len(self.outcomes) == 1 or not names:
+            return None
+        headlines = {o.headline for o in judged} & names
+        shares = ((_share(outcome, name), name, outcome) for name in sorted(headlines or names) for outcome in judged)
+        _, name, outcome = min(shares, key=lambda each: each[:2])
+        check = check_of(outcome, name)
+        return None if check is None else (outcome, check)
+
+    def grid(self) -> Grid | None:
+        """None where many combinations of values are missing. The first of repetitions has no number."""
+        parts = [[_NEXT.split(choice) for choice in _CHOICE.findall(outcome.name)] for outcome in self.outcomes]
+        choices = [dict(part.partition("=")[::2] for choice in each for part in choice) for each in parts]
+        names = list(dict.fromkeys(name for choice in choices for name in choice))
+        column = names.pop() if len(names) > 1 else ""
+        rows: dict[tuple[str, ...], dict[str, list[Outcome]]] = defaultdict(lambda: defaultdict(list))
+        for choice, outcome in zip(choices, self.outcomes, strict=True):
+            rows[tuple(choice.get(name, "1") for name in names)][choice.get(column, "1")].append(outcome)
+        values = list(dict.fromkeys(value for row in rows.values() for value in row))
+        is_matrix = names and len(rows) * len(values) <= _MOST_GAPS * len(self.outcomes)
+        return Grid(names, column, values, rows) if is_matrix else None
 
     def in_words(self) -> str:
         """``dil-course: 2 of 3 passed, worst is [recording=b.rec]: share 0.5 (at least 0.55)``"""
-        check = self.of(self.worst)
-        told = f": {checks.in_words(check)}" if check else ""
-        return f"{self.test}: {self.passed} of {self.number} passed, worst is {self.choice}{told}"
+        told = f"{self.name}: {self.count('passed')} of {len(self.outcomes)} passed"
+        if not (worst := self.worst()):
+            return told
+        outcome, check = worst
+        return f"{told}, worst is {outcome.name.removeprefix(self.name) or 'the first'}: {checks.in_words(check)}"
 
 
-def compared(outcomes: Sequence[Outcome]) -> list[Compared]:
-    """Each matrix with two instances or more that have a check with a limit in common.
-
-    The check is the test's headline, or else the one by which an instance is nearest to failing, or failed the most.
-    """
+def families(outcomes: Sequence[Outcome]) -> list[Family]:
+    """In the order of the outcomes."""
     found: dict[str, list[Outcome]] = defaultdict(list)
     for outcome in outcomes:
-        test, choice = _parted(outcome.name)
-        if choice.keys() - set(_REPETITIONS):
-            found[test].append(outcome)
-    return [one for test, instances in found.items() for one in _compared(test, instances)]
+        found[outcome.name.partition("[")[0]].append(outcome)
+    return [Family(name, members) for name, members in found.items()]
 
 
-def _compared(test: str, instances: Sequence[Outcome]) -> Iterator[Compared]:
-    judged = [outcome for outcome in instances if outcome.outcome != "error"]
-    each = [(outcome, check) for outcome in judged for check in outcome.checks]
-    names = {check["name"] for _, check in each if checks.share(check)}
-    names -= {check["name"] for outcome, check in each if checks.only_follows(check, outcome.checks)}
-    names = {name for name in names if all(_check(outcome, name) for outcome in judged)}
-    if len(instances) > 1 and names:
-        headline = next((o.headline for o in judged if o.headline in names), "")
-        name = headline or min(sorted(names), key=lambda name: min(_share(outcome, name) for outcome in judged))
-        worst = min(judged, key=lambda outcome: _share(outcome, name))
-        yield Compared(test, name, worst, sum(o.outcome == "passed" for o in instances), len(instances))
+def summary(outcomes: Sequence[Outcome]) -> list[str]:
+    """A line a test with several instances or repetitions."""
+    return [family.in_words() for family in families(outcomes) if len(family.outcomes) > 1]
 
 
-def _check(outcome: Outcome, name: str) -> Check | None:
+def check_of(outcome: Outcome, name: str) -> Check | None:
     return next((check for check in outcome.checks if check["name"] == name), None)
 
 
 def _share(outcome: Outcome, name: str) -> float:
-    check = _check(outcome, name)
+    check = check_of(outcome, name)
     return (check and checks.share(check)) or 1.0
-
-
-def _parted(name: str) -> tuple[str, dict[str, str]]:
-    """``test[light=dark,speed=2][run=2]`` in its name and choices."""
-    parts: list[str] = []
-    while len(name) <= _LONGEST_NAME and (match := _CHOICE.fullmatch(name)):
-        parts[:0] = _NEXT.split(match["choice"])
-        name = match["before"]
-    return name, dict(part.partition("=")[::2] for part in parts)
-
-
-def _grid(name: str, instances: Sequence[tuple[dict[str, str], Outcome]]) -> Iterator[MatrixGrid]:
-    dimensions = list(dict.fromkeys(key for choice, _ in instances for key in choice))
-    full = [({**{key: "1" for key in _REPETITIONS if key in dimensions}, **choice}, o) for choice, o in instances]
-    if len(full) < 2 or not dimensions or any(len(choice) < len(dimensions) for choice, _ in full):
-        return
-    column = dimensions[-1] if len(dimensions) > 1 else ""
-    others = [dimension for dimension in dimensions if dimension != column]
-    columns = list(dict.fromkeys(choice.get(column, "") for choice, _ in full))
-    cells: dict[tuple[str, ...], dict[str, list[Outcome]]] = defaultdict(lambda: defaultdict(list))
-    for choice, outcome in full:
-        cells[tuple(choice[key] for key in others)][choice.get(column, "")].append(outcome)
-    if len(cells) * len(columns) > _MOST_GAPS * len(full):
-        return  # no matrix, which has every combination
-    rows = [GridRow(values, [row.get(value, []) for value in columns]) for values, row in cells.items()]
-    yield MatrixGrid(name, others, column, columns if column else ["outcome"], rows)

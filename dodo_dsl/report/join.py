@@ -1,19 +1,16 @@
 """Any number of reports in one folder, in which every link works offline.
 
-Copies are of files that reports hold: no symlinks, no more than fits. A report's ``drive.js`` is a script, and may come
-from an untrusted source: only the value that it assigns is kept, checked to be data, with this DoDo's page and
-scripts. For a comparison, the paths of another report's tests lie beside the pages of this one's, to be drawn over one
-another.
+Copies are of files that reports hold, and no symlinks. A report's ``drive.js`` is a script, and may come from an
+untrusted source: only the value that it assigns is kept, checked to be data, with this DoDo's page and scripts.
 """
 
-import contextlib
 import errno
 import io
 import json
 import os
 import shutil
 import stat
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,15 +18,11 @@ from dodo_dsl import atomic
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import results
-from dodo_dsl.report.comparison import Comparison
-from dodo_dsl.report.files import BEFORE, DATA, PAGE, VIDEOS, is_of_a_test
+from dodo_dsl.report.files import DATA, VIDEOS, is_of_a_test
 from dodo_dsl.report.next_report import next_report
 from dodo_dsl.report.results import GivenReport, JoinedTest, distinct
 from dodo_dsl.report.viewer import page
-from dodo_dsl.report.viewer.encoded import VARIABLE, packed, script, shown, unpacked
-
-MOST_BYTES = 16 << 30
-"""Of all files of a joined report."""
+from dodo_dsl.report.viewer.encoded import VARIABLE, script, shown
 
 
 class NotCopied(ValueError):
@@ -50,16 +43,14 @@ def join(reports: Sequence[GivenReport], out: Path) -> tuple[list[Outcome], list
         if (out / slug).is_symlink():
             raise _not_replaceable(out / slug, "a symlink, which no output follows")
     with next_report(out, slugs) as target:
-        left = MOST_BYTES
         for test in tests:
             if test.slug != test.outcome.slug:
                 name = f"'{test.slug}' of {test.report.file}"
                 sentences.append(f"{name} is called '{test.outcome.slug}', as there is one before it")
             source = test.report.folder / test.slug
             if test.report.is_whole and not source.is_symlink():
-                left -= _copy_test(source, target.folder / test.outcome.slug, test, left, sentences)
+                _copy_test(source, target.folder / test.outcome.slug, test, sentences)
         target.take_place(slugs)
-    (out / "history.json").unlink(missing_ok=True)  # of one machine
     return [test.outcome for test in tests], sentences
 
 
@@ -80,34 +71,24 @@ def _not_replaceable(path: Path, why: str) -> atomic.NotReplaceable:
     return atomic.NotReplaceable(errno.EEXIST, f"{why}; nothing is replaced", str(path))
 
 
-def _copy_test(source: Path, target: Path, test: JoinedTest, left: int, sentences: list[str]) -> int:
-    """Copies a test's files, of ``left`` bytes at most, and says how many they were; raises OSError."""
-    copied = 0
+def _copy_test(source: Path, target: Path, test: JoinedTest, sentences: list[str]) -> None:
+    """Copies a test's files; raises OSError."""
     for folder, _, names in os.walk(source):
         for path in sorted(Path(folder) / name for name in names):
             name = path.relative_to(source).as_posix()
             try:
                 if name == DATA:
                     text = script(read_document(path, test.outcome))
-                    (target / name).parent.mkdir(parents=True, exist_ok=True)
+                    target.mkdir(parents=True, exist_ok=True)
                     (target / name).write_text(text, encoding="ascii")
                     page.write_html(target)
                 elif is_of_a_test(name):
                     with opened(path) as file:
-                        copied += _copy(file, target / name, left - copied)
+                        (target / name).parent.mkdir(parents=True, exist_ok=True)
+                        with (target / name).open("xb") as copy:
+                            shutil.copyfileobj(file, copy)
             except NotCopied as problem:
                 sentences.append(f"{path} is left out{' with its page' if name == DATA else ''}: {problem}")
-    return copied
-
-
-def _copy(file: io.FileIO, target: Path, most: int) -> int:
-    size = os.fstat(file.fileno()).st_size
-    if size > most:
-        raise NotCopied(f"its {size} bytes would make the report larger than {MOST_BYTES >> 30} GiB")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with target.open("xb") as copy:
-        shutil.copyfileobj(file, copy)
-    return size
 
 
 def opened(path: Path) -> io.FileIO:
@@ -125,7 +106,7 @@ def opened(path: Path) -> io.FileIO:
 _BEGIN, _END = f"var {VARIABLE} = ", ";\n"
 
 
-def read_document(path: Path, outcome: Outcome | None = None) -> dict[str, Any]:
+def read_document(path: Path, outcome: Outcome) -> dict[str, Any]:
     """The value that a ``drive.js`` assigns, by the name of ``outcome``; raises NotCopied for anything else."""
     with opened(path) as file:
         data = file.read(regular_file.MOST_BYTES + 1)
@@ -140,41 +121,8 @@ def read_document(path: Path, outcome: Outcome | None = None) -> dict[str, Any]:
             raise NotCopied(f"it is of version {shown(document['version'], 20)}, expected {page.VERSION}")
         if not {video["file"] for video in document["videos"] if "file" in video} <= {*VIDEOS}:
             raise NotCopied("it is not the data of a drive")
-        if outcome:
-            document["test"] |= {"name": shown(outcome.name), "slug": shown(outcome.slug)}
+        document["test"] |= {"name": shown(outcome.name), "slug": shown(outcome.slug)}
         script(document)  # raises for numbers such as 1e999
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise error if isinstance(error, NotCopied) else NotCopied("it is not the data of a drive") from error
     return document
-
-
-BEFORE_VARIABLE = "dodoBefore"
-FIELDS = ("x", "y", "qx", "qy", "qz", "qw")
-
-
-def write_other_paths(folder: Path, comparison: Comparison | None, other: GivenReport | None) -> None:
-    """Puts the other report's paths into ``folder``, a report, in place of an earlier comparison's; raises OSError."""
-    for path in sorted(folder.glob(f"*/{BEFORE}")):
-        path.unlink()
-        page.write_html(path.parent)
-    for test in comparison.tests if comparison and other and other.is_whole else ():
-        if other and test.before and test.after and (folder / test.after.slug / PAGE).is_file():
-            for found in _path(other.folder / test.before.slug, test.before):
-                place = folder / test.after.slug
-                atomic.write_text(place / BEFORE, script(found, BEFORE_VARIABLE))
-                page.write_html(place)
-
-
-def _path(source: Path, before: Outcome) -> Iterator[dict[str, Any]]:
-    """The positions of a test in another report, which is untrusted; nothing if there are none."""
-    with contextlib.suppress(NotCopied, OSError, KeyError, TypeError, ValueError, AttributeError):
-        document = {} if source.is_symlink() else read_document(source / DATA)
-        frame = document["scene"]["frame"]
-        for channel in document["channels"]:
-            if (channel["message"], channel["sender"]) == (frame["message"], frame["sender"]):
-                columns = {field["name"]: unpacked(field["values"]) for field in channel["fields"]}
-                times, values = unpacked(channel["times"]), [columns[name] for name in FIELDS]
-                if {len(each) for each in values} == {len(times)}:
-                    fields = [{"name": n, "values": packed(v)} for n, v in zip(FIELDS, values, strict=True)]
-                    yield {"outcome": before.outcome, "times": packed(times), "fields": fields}
-                return

@@ -5,8 +5,7 @@ In real time values scatter; there only the rate at which a test passes says som
 
 import hashlib
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from dodo_dsl.outcome import Outcome, differs_each_run
@@ -14,50 +13,8 @@ from dodo_dsl.plan.added_services import RECORDING
 
 PATH = ("opendlv.sim.Frame", "opendlv.sim.KinematicState")
 """The messages of the vehicle's path."""
-_MOST_SHOWN, _MAX_SHOWN = 4, 100
-
-
-@dataclass(frozen=True)
-class Difference:
-    """What is not the same in all runs."""
-
-    name: str
-    """A check, or outcome, reason, test time or path, a hash of where the vehicle was."""
-    values: tuple[str, ...]
-    """The value of each run, in their order."""
-
-    def in_words(self) -> str:
-        """Each value with its runs, counted from 1; the last of many are left out."""
-        runs: defaultdict[str, list[str]] = defaultdict(list)
-        for number, value in enumerate(self.values, 1):
-            runs[value].append(str(number))
-        parts = [
-            f"{value[:_MAX_SHOWN]} in run{'s' * (len(numbers) > 1)} {', '.join(numbers)}"
-            for value, numbers in runs.items()
-        ]
-        more = [f"and {len(parts) - _MOST_SHOWN} more"] if len(parts) > _MOST_SHOWN else []
-        return f"{self.name}: {'; '.join([*parts[:_MOST_SHOWN], *more])}"
-
-
-@dataclass(frozen=True)
-class Repeated:
-    """The runs of a test in lockstep."""
-
-    test: str
-    """The slug of the test."""
-    runs: tuple[str, ...]
-    """The slugs of its runs."""
-    differing: tuple[Difference, ...] = ()
-    """What is not the same in all runs; empty where all are the same."""
-
-    def lines(self) -> Iterator[str]:
-        """What to print of it."""
-        if not self.differing:
-            yield f"{self.test}: the {len(self.runs)} runs in lockstep have the same values"
-            return
-        yield f"{self.test}: the {len(self.runs)} runs in lockstep differ"
-        for each in self.differing:
-            yield f"        {each.in_words()}"
+_MOST_SHOWN, _MAX_SHOWN = 10, 60
+"""Runs of a line, and characters of a value."""
 
 
 def values(outcome: Outcome, report: Path) -> dict[str, str]:
@@ -92,19 +49,25 @@ def path_of(recording: Path) -> str:
     return digest.hexdigest()[:16]
 
 
-def compared(runs: Sequence[tuple[str, dict[str, str]]]) -> Repeated:
-    """Repetitions of a test, each by its slug with its ``values``; the first has the test's own."""
-    names = dict.fromkeys(name for _, found in runs for name in found)
-    rows = [Difference(name, tuple(found.get(name, "none") for _, found in runs)) for name in names]
-    differing = tuple(row for row in rows if len(set(row.values)) > 1)
-    return Repeated(runs[0][0], tuple(slug for slug, _ in runs), differing)
+def repeated(runs: Iterable[tuple[Path, Outcome, Path]]) -> dict[str, list[str]]:
+    """What differs between runs of one test in lockstep, a line each, by the slug of the first.
 
-
-def repeated(runs: Iterable[tuple[Path, Outcome, Path]]) -> list[Repeated]:
-    """Those of each test in lockstep that ran more than once; a run is its compiled test, outcome and report."""
+    A run is its compiled test, its outcome and its report. Tests that ran once or in real time are left out.
+    """
     found: defaultdict[Path, list[tuple[Outcome, Path]]] = defaultdict(list)
     for compiled, outcome, report in runs:
         if outcome.clock != "realtime":
             found[compiled].append((outcome, report))
     several = (each for each in found.values() if len(each) > 1)
-    return [compared([(outcome.slug, values(outcome, report)) for outcome, report in each]) for each in several]
+    return {each[0][0].slug: _differing([values(*run) for run in each]) for each in several}
+
+
+def _differing(runs: Sequence[Mapping[str, str]]) -> list[str]:
+    """The names whose values are not all the same, each with the values of the first runs in their order."""
+    names = dict.fromkeys(name for run in runs for name in run)
+    rows = {name: [run.get(name, "none") for run in runs] for name in names}
+    return [
+        f"{name}: {', '.join(value[:_MAX_SHOWN] for value in row[:_MOST_SHOWN])}"
+        for name, row in rows.items()
+        if len(set(row)) > 1
+    ]

@@ -2,15 +2,13 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import atomic
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.added_services import RECORDING, SNAPSHOT
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.report import comparison as report_comparison
-from dodo_dsl.report import for_gitlab, instances, overview, results
+from dodo_dsl.report import for_gitlab, overview, results
 from dodo_dsl.report.comparison import Comparison
 from dodo_dsl.report.files import FRAME, LOGS, PAGE, TRAJECTORY
 from dodo_dsl.report.overview import LinkedFiles
@@ -19,20 +17,15 @@ from dodo_dsl.spec.registry import SUFFIX
 _LONGEST_PATH = 1000
 
 
-@dataclass(frozen=True)
-class Drawable:
-    """A test's Plan and the folder that it was compiled into, for the map under its path."""
+def draw_test(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> list[str]:
+    """Draws a test's drive and page in a report's ``folder``, and returns sentences on what could not be drawn.
 
-    plan: Plan
-    folder: Path
-
-
-def draw_test(folder: Path, outcome: Outcome, test: Drawable) -> list[str]:
-    """Draws a test's drive and page in a report's ``folder``, and returns sentences on what could not be drawn."""
+    ``compiled`` is the folder of the compiled test, for the map under its path.
+    """
     from dodo_dsl.report.viewer import page
 
     try:
-        page.write(folder / outcome.slug, outcome, test.plan, test.folder)
+        page.write(folder / outcome.slug, outcome, plan, compiled)
     except Exception as error:  # noqa: BLE001  (the data comes from services, and no page may cost a verdict)
         (folder / outcome.slug / PAGE).unlink(missing_ok=True)
         return [f"the page of {outcome.name} cannot be written: {error}"]
@@ -44,30 +37,26 @@ def write_summaries(
     outcomes: Sequence[Outcome],
     circumstances: results.Circumstances = results.NO_CIRCUMSTANCES,
     comparison: Comparison | None = None,
-    past: overview.Past | None = None,
+    past: overview.Past = overview.NO_PAST,
 ) -> None:
     """Writes the files about the whole run, the results first, and with a comparison that with another report.
 
-    Without one, that of an earlier report is removed. ``past`` is what checks measured in the latest runs of these
-    tests on this machine. Raises OSError.
+    ``past`` are the latest runs of its tests on this machine. Raises OSError.
     """
     atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes, circumstances))
     atomic.write_text(folder / "metrics.txt", for_gitlab.metrics_text(outcomes))
-    report_comparison.write_markdown(folder, comparison, [one.in_words() for one in instances.compared(outcomes)])
-    if past is not None:
-        overview.write_history(folder, past)
     files = {o.slug: _files(folder, o) for o in outcomes}
     pages = {slug: found.drive for slug, found in files.items() if found.drive}
     if pages:
         from dodo_dsl.report.viewer import page
 
-        page.write_shared(folder, [o for o in sorted(outcomes, key=overview.urgency) if o.slug in pages])
+        page.write_shared(folder)
     shown = _shown(folder)
-    with atomic.replacing(folder / "junit.xml") as part:
-        attachments = {slug: f"{shown}/{found.pictures[0][0]}" for slug, found in files.items() if found.pictures}
-        moments = for_gitlab.to_moments(outcomes, pages, shown)
-        for_gitlab.write_junit(part, outcomes, attachments, moments, circumstances.not_run, circumstances.runs)
-    html = overview.render(outcomes, files, overview.read_history(folder), comparison, circumstances)
+    attachments = {slug: f"{shown}/{found.pictures[0][0]}" for slug, found in files.items() if found.pictures}
+    moments = for_gitlab.to_moments(outcomes, pages, shown)
+    junit = for_gitlab.junit(outcomes, attachments, moments, circumstances.not_run, circumstances.runs)
+    atomic.write_bytes(folder / "junit.xml", junit)
+    html = overview.render(outcomes, files, comparison, circumstances, past)
     atomic.write_text(folder / "index.html", html)
 
 

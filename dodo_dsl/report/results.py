@@ -16,7 +16,6 @@ import msgspec
 
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import NotRun, Outcome
-from dodo_dsl.report.repetitions import Repeated
 from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.model import is_goal
 
@@ -84,8 +83,6 @@ class Circumstances:
     not_run: tuple[NotRun, ...] = ()
     """Tests of the run that never began, because it was interrupted or a test before them did not pass (--fail-fast);
     they have no outcome."""
-    repeated: tuple[Repeated, ...] = ()
-    """Tests in lockstep that ran more than once (--repeat), and whether all runs gave the same."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,9 +165,7 @@ def joined(each: Sequence[GivenReport]) -> Circumstances:
     ran = {outcome.slug for one in each for outcome in one.outcomes}
     left = {test.slug: test for one in each for test in one.circumstances.not_run if test.slug not in ran}
     runs = dict.fromkeys(run for one in each for run in one.circumstances.runs)
-    return Circumstances(
-        tuple(runs), tuple(left.values()), tuple(known for one in each for known in one.circumstances.repeated)
-    )
+    return Circumstances(tuple(runs), tuple(left.values()))
 
 
 def load(path: Path) -> list[Outcome]:
@@ -196,4 +191,4 @@ def read_given(path: Path) -> GivenReport:
         if len(outcome.slug) > MOST_SLUG or not SLUG.fullmatch(outcome.slug):
             shown = outcome.slug[:_SHOWN_PATH]
             raise ResultsError(f"{file}: '{shown}' is not a slug, expected lower-case letters, digits and hyphens")
-    return GivenReport(file, found.tests, Circumstances(found.runs, found.not_run, found.repeated))
+    return GivenReport(file, found.tests, Circumstances(found.runs, found.not_run))

@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import shutil
 import socket
 import subprocess
 from collections.abc import Callable, Iterator
@@ -53,7 +52,7 @@ def multicast() -> Iterator[Capability]:
             sender.sendto(b"dodo", group(_CID))
             receiver.recv(65_535)
     except OSError as error:
-        way = advice.as_root("ip link set lo up multicast on", "ip route replace 225.0.0.0/24 dev lo")
+        way = "as root: ip link set lo up multicast on && ip route replace 225.0.0.0/24 dev lo"
         yield Capability(
             "multicast", "problem", f"does not work on the host ({error}); 'isolation: host' needs it", way
         )
@@ -89,8 +88,7 @@ def compose_plugin() -> Iterator[Capability]:
         yield Capability("compose", "ok", f"version {text}")
         return
     found = f"version {text} is older than 2.20" if text else "'docker compose' does not run"
-    way = advice.docker_plugin("compose") if shutil.which("docker") else advice.docker()
-    yield Capability("compose", "warning", f"{found}; --backend docker and mixed need it", way)
+    yield Capability("compose", "warning", f"{found}; --backend docker and mixed need it", advice.DOCKER)
 
 
 FIRMWARE = "DODO_FIRMWARE"
@@ -106,7 +104,7 @@ def emulated_rig() -> Iterator[Capability]:
             yield Capability("emulated rig", "ok", f"is built, in {place}")
             return
     text = f"is not built: it is not in {' or '.join(map(str, places))}; hil tests need it"
-    yield Capability("emulated rig", "warning", text, advice.firmware(FIRMWARE))
+    yield Capability("emulated rig", "warning", text, advice.FIRMWARE)
 
 
 def left_behind() -> Iterator[Capability]:

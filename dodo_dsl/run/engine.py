@@ -22,9 +22,8 @@ from dodo_dsl.run.protocol import (
     Overrun,
     Paused,
     Time,
-    VerdictEvent,
 )
-from dodo_dsl.run.run_state import Ended, RunState, Standing, standing
+from dodo_dsl.run.run_state import Ended, RunState
 from dodo_dsl.run.sides import Backend
 
 READY_PATIENCE_S = READY_S
@@ -38,7 +37,7 @@ LISTEN_PATIENCE_S, LISTEN_PERIOD_S = 10.0, 0.02
 class Engine:
     """Drives one backend through one Plan. ``say`` is called with each phase, for live progress.
 
-    ``stands`` is called with how far it is, ``passed`` before a test is taken down that has passed.
+    ``passed`` is called before a test is taken down that has passed.
 
     All times are of the running event loop's clock, in s.
     """
@@ -46,7 +45,6 @@ class Engine:
     plan: Plan
     backend: Backend
     say: Callable[[str], None]
-    stands: Callable[[Standing], None] = lambda _: None
     passed: Callable[[], None] = lambda: None
     state: RunState = field(init=False)
     _now: Callable[[], float] = field(init=False)
@@ -197,15 +195,12 @@ class Engine:
         began = self.state.began = self._now()
         await self._begin()
         self.say("running in lockstep by answers" if self.plan.lockstep and self.backend.by_answers else "running")
-        self.stands(standing(self.state))
         lockstep = self.plan.lockstep
         deadline = began + (lockstep.wall_timeout_s if lockstep else self.plan.timeout_s)
         while not self.state.all_evaluators_ended():
             event = await self._next(min(deadline, self._next_begin()))
             if event is not None:
                 self.state.take(event)
-                if isinstance(event, Time | VerdictEvent):
-                    self.stands(standing(self.state))
             elif self._now() < deadline:
                 await self._begin()
             elif lockstep:

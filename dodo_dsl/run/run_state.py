@@ -333,15 +333,3 @@ def pictured_by(plan: Plan) -> list[str]:
     """Services that show pictures to the application: those of the environment with shared memory."""
     kinds = ("memory", "memories")
     return [s.name for s in plan.layer("environment") if any(flag.kind in kinds for flag in s.flags)]
-
-
-@dataclass(frozen=True)
-class Standing:
-    """The ``seconds`` of its own time that a test has reached; in real time that goes on by itself, from 0."""
-
-    seconds: float
-    is_lockstep: bool
-
-
-def standing(state: RunState) -> Standing:
-    return Standing(state.time.seconds if state.time else 0.0, state.plan.lockstep is not None)

@@ -17,7 +17,6 @@ from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
 from dodo_dsl.run.outcomes import describe, error_outcome, error_reason, system_error
 from dodo_dsl.run.rigs.pool import opened
-from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.schedule import CorePool, Schedule
 
 BackendName = Literal["process", "docker", "mixed"]
@@ -36,11 +35,7 @@ class Progress(Protocol):
 
     def phase(self, slug: str, text: str) -> None: ...
 
-    def standing(self, slug: str, standing: Standing) -> None: ...
-
     def done(self, outcome: Outcome) -> None: ...
-
-    def rest(self, seconds: float, tests: int) -> None: ...
 
 
 def default_backend(plans: Sequence[Plan]) -> BackendName:
@@ -79,7 +74,6 @@ class Runner:
         self.skipped: list[Job] = []
         self._cores = CorePool(schedule.capacity)
         self._waiting: list[Job] = []
-        self._began: dict[str, tuple[Job, float]] = {}
         self.kept: list[str] = []
         """Sentences on the tests that were left running."""
         self._made: dict[str, int] = {}
@@ -135,7 +129,6 @@ class Runner:
         self._stop |= self.policy.fail_fast and outcome.outcome != "passed"
         self.progress.done(outcome)
         self._finished(job, outcome)
-        self._show_rest()
         return outcome
 
     async def _turn(self, job: Job, cores: int, attempt: Callable[[], Awaitable[Outcome]]) -> Outcome | None:
@@ -145,14 +138,11 @@ class Runner:
                 self._waiting.remove(job)
                 if self._stop or self.interrupted:
                     return None
-                self._began[job.plan.slug] = (job, _now())
                 return await attempt()
         except asyncio.CancelledError:
             return None
         except Exception as error:  # noqa: BLE001  (one job must not cost the results of the others)
             return error_outcome(job.plan, self.backends.name, error_reason(error, job.report))
-        finally:
-            self._began.pop(job.plan.slug, None)
 
     async def _again(self, job: Job, first: Outcome) -> Outcome:
         """The outcome of a test for which the machine was too busy."""
@@ -198,7 +188,7 @@ class Runner:
     async def _attempt(self, job: Job) -> Outcome:
         slug, outcome = job.plan.slug, None
         self._made[slug] = self._made.get(slug, 0) + 1
-        say, stands = functools.partial(self.progress.phase, slug), functools.partial(self.progress.standing, slug)
+        say = functools.partial(self.progress.phase, slug)
 
         def forget_pictures() -> None:
             with contextlib.suppress(OSError):
@@ -206,7 +196,7 @@ class Runner:
 
         try:
             async with opened(job, say, lambda one: self.backends.open(one, say, self.keep)) as (chosen, backend):
-                engine = Engine(chosen.plan, backend, say, stands, forget_pictures)
+                engine = Engine(chosen.plan, backend, say, forget_pictures)
                 outcome, kept = await engine.run(self.keep)
                 self.kept.extend(kept)
                 if job.plan.pool:
@@ -220,13 +210,6 @@ class Runner:
         if outcome.outcome == "passed" and not self.keep:
             forget_pictures()
         return outcome
-
-    def _show_rest(self) -> None:
-        if self.interrupted:
-            return
-        running = [(job, _now() - began) for job, began in self._began.values()]
-        if tests := len(running) + len(self._waiting):
-            self.progress.rest(self.schedule.forecast(self._waiting, running), tests)
 
 
 @contextlib.contextmanager
@@ -242,10 +225,6 @@ def _signals_call(react: Callable[[], None]) -> Iterator[None]:
         for number, handler in before.items():
             loop.remove_signal_handler(number)
             signal.signal(number, handler)
-
-
-def _now() -> float:
-    return asyncio.get_running_loop().time()
 
 
 def is_undecided(outcome: Outcome) -> bool:

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import heapq
 import os
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
@@ -12,39 +11,34 @@ from dodo_dsl.run.backends import Job
 _RIG = 2
 """Cores for all programs of a test on a rig: an emulated one that is late spoils its test."""
 
+Took = Callable[[Job], float | None]
 
-def schedule(jobs: int | None, expected: Callable[[Job], float]) -> "Schedule":
+
+def schedule(jobs: int | None, took: Took = lambda _: None) -> "Schedule":
     """A schedule of ``jobs`` at once, or of as many as there are cores for this process."""
     if jobs is not None:
-        return Schedule(jobs, lambda _: 1, expected)
-    return Schedule(len(os.sched_getaffinity(0)), lambda job: _RIG if job.plan.rig else 1, expected)
+        return Schedule(jobs, lambda _: 1, took)
+    return Schedule(len(os.sched_getaffinity(0)), lambda job: _RIG if job.plan.rig else 1, took)
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """How many cores there are, how many each job needs, and how long it is expected to take in s."""
+    """How many cores there are, how many each job needs, and how long it took in s, None if it never ran."""
 
     capacity: int
     need: Callable[[Job], int]
-    expected: Callable[[Job], float]
+    took: Took = lambda _: None
 
     def ordered(self, jobs: Sequence[Job]) -> list[Job]:
-        """The longest first, so that none of them runs alone at the end."""
-        return sorted(jobs, key=self.expected, reverse=True)
+        """The longest first, so that none of them runs alone at the end; an unknown one may take its whole timeout."""
+        return sorted(jobs, key=lambda job: self.took(job) or job.plan.timeout_s, reverse=True)
 
-    def forecast(self, jobs: Sequence[Job], running: Sequence[tuple[Job, float]] = ()) -> float:
-        """Seconds until the last of ``jobs`` has ended; ``running`` are jobs with the seconds that they ran already."""
-        now, free = 0.0, self.capacity
-        ends: list[tuple[float, int, int]] = []
-        begun = [(job, max(self.expected(job) - elapsed, 0.0)) for job, elapsed in running]
-        for number, (job, left) in enumerate([*begun, *((job, self.expected(job)) for job in jobs)]):
-            need = min(self.need(job), self.capacity)
-            while ends and free < need and number >= len(begun):
-                now, _, given = heapq.heappop(ends)
-                free += given
-            free -= need
-            heapq.heappush(ends, (now + left, number, need))
-        return max((end for end, _, _ in ends), default=0.0)
+    def estimate(self, jobs: Sequence[Job]) -> float | None:
+        """Seconds that all cores are busy with the jobs, or that the longest one takes; None if one is unknown."""
+        known = [(took, min(self.need(job), self.capacity)) for job in jobs if (took := self.took(job)) is not None]
+        if len(known) < len(jobs):
+            return None
+        return max(sum(took * need for took, need in known) / self.capacity, *(took for took, _ in known))
 
 
 class CorePool:

@@ -1,12 +1,11 @@
 "use strict";
-// Search, filters and order of the tests. Without this script the page shows all of them, what did not pass first.
+// Search and filters of the tests. Without this script the page shows all of them, what did not pass first.
 (function () {
   const form = document.getElementById("_filters");
   const count = document.getElementById("_count");
   const list = document.getElementById("_tests");
   const matrices = Array.from(list.querySelectorAll(".matrix"), (element) => ({ element, isOpen: element.open }));
   const tests = Array.from(list.querySelectorAll(".test"), (element) => ({ element, text: null }));
-  const orders = [list, ...list.querySelectorAll(".instances")].map((parent) => ({ parent, children: Array.from(parent.children) }));
 
   function text(test) {
     if (test.text === null) test.text = test.element.textContent.toLowerCase();
@@ -33,23 +32,6 @@
     count.textContent = shown === tests.length ? all : `${shown} of ${all}`;
   }
 
-  // By name, or by a number, of which that of a test without one comes last; a matrix is where its first test is.
-  function key(element, name) {
-    if (name === "name") return element.querySelector("h3").textContent;
-    const found = [element, ...element.querySelectorAll(".test")].map((each) => each.dataset[name]).filter(Boolean).map(Number);
-    if (!found.length) return Infinity;
-    return name === "margin" ? Math.min(...found) : -found[0];
-  }
-
-  function sort() {
-    const name = form.elements.sort.value;
-    for (const { parent, children } of orders) {
-      const keyed = children.map((element) => ({ element, key: name ? key(element, name) : 0 }));
-      keyed.sort((a, b) => (name === "name" ? a.key.localeCompare(b.key, "en", { numeric: true }) : a.key === b.key ? 0 : a.key - b.key));
-      parent.append(...keyed.map(({ element }) => element));
-    }
-  }
-
   // A link to a test shows it, also where filters hide it, with its details.
   function reveal() {
     const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
@@ -64,7 +46,7 @@
     target.scrollIntoView();
   }
 
-  form.addEventListener("input", (event) => (event.target.name === "sort" ? sort() : filter()));
+  form.addEventListener("input", filter);
   form.addEventListener("submit", (event) => event.preventDefault());
   window.addEventListener("hashchange", reveal);
   form.hidden = false;

@@ -64,7 +64,6 @@ dodo.cursor = (function () {
     pause,
     linked,
     time: () => now,
-    isPlaying: () => frame !== null,
     toggle: () => (frame === null ? play() : pause()),
     setSpeed: (value) => (speed = value),
     follow: (follower) => followers.push(follower),

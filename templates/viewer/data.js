@@ -18,9 +18,9 @@ dodo.data = (function () {
     return low - 1;
   }
 
-  const unpacked = (raw) => ({ ...raw, times: unpack(raw.times), fields: raw.fields.map((field) => ({ ...field, values: unpack(field.values) })) });
   const test = window.dodoTest;
-  const channels = test.channels.map(unpacked);
+  const field = (raw) => ({ ...raw, values: unpack(raw.values) });
+  const channels = test.channels.map((raw) => ({ ...raw, times: unpack(raw.times), fields: raw.fields.map(field) }));
   const box = ([label, x, y, width, height, score]) => ({ label, x, y, width, height, score });
   const frames = test.frames.map((frame) => ({ ...frame, hit: frame.hit.map(box), false: frame.false.map(box), missed: frame.missed.map(box) }));
   const frameTimes = Float32Array.from(frames, (frame) => frame.time);
@@ -30,7 +30,6 @@ dodo.data = (function () {
     channels,
     unpack,
     bytes,
-    unpacked,
     at,
     frames,
     frameTimes,

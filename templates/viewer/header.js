@@ -1,35 +1,11 @@
-// The head of the page: what became of the test, steps to other failed ones, its files and commands, and the time line.
+// The head of the page: what became of the test, its files and commands, and the time line.
 "use strict";
 
 dodo.header = (function () {
   const { cursor } = dodo;
   const { choice, make, seconds } = dodo.dom;
   const { test, moment, files, spec } = dodo.data.test;
-  const SLUG = /^[a-z0-9-]+$/;
-  const failed = (window.dodoFailed || []).filter(([slug]) => SLUG.test(slug));
   const [STEP, LONG] = [0.1, 1];
-  const KEYS = [
-    ["space", "play, pause"], ["← →", "0.1 s back or on, with shift 1 s"], ["Home End", "begin, end"],
-    ["D", "the moment that decided"], ["N P", "next, previous failed test"], ["?", "these keys"],
-  ];
-  const keyRows = KEYS.flatMap(([key, what]) => [make("dt", {}, ...key.split(" ").map((each) => make("kbd", {}, each))), make("dd", {}, what)]);
-  const keys = dialog("Keys", make("dl", {}, ...keyRows));
-
-  // The failed test so many steps on in the report; null where there is none.
-  function other(steps) {
-    const own = failed.findIndex(([slug]) => slug === test.slug);
-    return failed[own < 0 ? (steps > 0 ? 0 : -1) : own + steps] || null;
-  }
-
-  function link(steps, text) {
-    const found = other(steps);
-    return found ? make("a", { href: `../${found[0]}/drive.html`, title: `${found[1]}: ${found[2]}` }, text) : "";
-  }
-
-  function step(steps) {
-    const found = other(steps);
-    if (found) location.href = `../${found[0]}/drive.html`;
-  }
 
   // What repeats the test; repetitions and copies of it have the same name but for their number.
   function command() {
@@ -49,27 +25,16 @@ dodo.header = (function () {
     return button;
   }
 
-  function dialog(name, ...content) {
-    const close = make("button", { onclick: () => made.close() }, "Close");
-    const made = make("dialog", { "aria-label": name }, make("h2", {}, name), ...content, close);
-    document.body.append(made);
-    return made;
-  }
-
-  function opener(name, title, made) {
-    return make("button", { title, onclick: () => made.showModal() }, name);
-  }
-
   function links() {
     const found = files.filter((file) => /^[a-z]+\.rec$/.test(file)).map((file) => make("a", { href: file, download: file }, file));
     if (dodo.data.test.log.lines.length) found.push(make("a", { href: "logs/" }, "logs"));
-    if (spec) found.push(opener("Spec", test.spec, dialog(test.spec, make("pre", { tabindex: "0" }, spec))));
+    if (spec) found.push(make("a", { href: URL.createObjectURL(new Blob([spec], { type: "text/plain;charset=utf-8" })), target: "_blank", title: test.spec }, "spec"));
     const mcap = `dodo rec export ${test.slug}/test.rec --mcap -o ${test.slug}.mcap`;
     return files.includes("test.rec") ? [...found, copier("Copy MCAP command", mcap)] : found;
   }
 
   function pressed(event) {
-    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("select, input[type=search], dialog")) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("select, input[type=search]")) return;
     const size = event.shiftKey ? LONG : STEP;
     const actions = {
       ArrowLeft: () => cursor.move(cursor.time() - size),
@@ -78,9 +43,6 @@ dodo.header = (function () {
       End: () => cursor.move(cursor.last),
       " ": () => cursor.toggle(),
       d: () => cursor.move(moment.time),
-      n: () => step(1),
-      p: () => step(-1),
-      "?": () => keys.showModal(),
     };
     if (event.key === " " && event.target.closest("button, summary")) return;
     if (!Object.hasOwn(actions, event.key)) return;
@@ -126,7 +88,7 @@ dodo.header = (function () {
     part("reason").textContent = test.title;
     part("reason").title = test.reason;
     part("files").append(...links());
-    part("actions").append(link(-1, "‹ Previous failed"), link(1, "Next failed ›"), copier("Copy command", command()), opener("?", "Keys (?)", keys));
+    part("actions").append(copier("Copy command", command()));
     if (dodo.data.test.duration > 0) transport(part("transport"));
     document.addEventListener("keydown", pressed);
   }

@@ -3,12 +3,11 @@
 
 dodo.map = (function () {
   const { test, channel, channels, field, at } = dodo.data;
-  const { make, svg, number } = dodo.dom;
+  const { make, svg } = dodo.dom;
   const { frame, lines, models } = test.scene;
   const [length, width] = [test.scene.length || 0.36, test.scene.width || 0.16];
   const MOST = 2000;
   const driven = read(channel(frame.message, frame.sender) || channels.find((c) => c.message === frame.message));
-  const before = read(window.dodoBefore && dodo.data.unpacked(window.dodoBefore));
   const bodies = test.scene.bodies.map((body) => ({ ...body, ...read(channel(frame.message, body.sender)) })).filter((body) => body.poses.length);
 
   function read(source) {
@@ -47,9 +46,9 @@ dodo.map = (function () {
     return kept.map(({ x, y }, n) => `${n ? "L" : "M"}${x} ${y}`).join("");
   }
 
-  function vehicle(kind) {
+  function vehicle() {
     const [l, w] = [length / 2, width / 2];
-    return svg("path", { class: `vehicle ${kind}`, d: `${closed([[l, w], [-l, w], [-l, -w], [l, -w]])}M0 0H${1.5 * l}` });
+    return svg("path", { class: "vehicle", d: `${closed([[l, w], [-l, w], [-l, -w], [l, -w]])}M0 0H${1.5 * l}` });
   }
 
   // A drawing whose `box(time)` is left, low, width and height in m. `fixed` parts keep their size on the screen.
@@ -68,14 +67,12 @@ dodo.map = (function () {
       if (["gate", "goal"].includes(each.role) && each.lines.length) ground.push(name(each.name, each.role, each.lines[0][2], each.lines[0][3]));
     }
     const now = svg("path", { class: "driven" });
-    const own = vehicle("now");
+    const own = vehicle();
     const moving = bodies.map((body) => {
       const shape = painted(svg("path", { class: "body", d: closed(body.outline) }), "fill", body.colour);
       return [body, shape, name(body.name, "other", 0, 0), svg("path", { class: "trail" })];
     });
     const parts = [...ground, svg("path", { class: "whole", d: trace(driven) }), now, ...moving.flatMap(([, shape, text, trail]) => [trail, shape, text])];
-    const other = before.poses.length ? vehicle("before") : null;
-    if (other) parts.push(svg("path", { class: "earlier", d: trace(before) }), other);
     if (test.test.outcome !== "passed") {
       const { x, y } = test.moment.x === null ? pose(driven, test.moment.time) : test.moment;
       parts.push(still(x, y, svg("path", { class: "failure", d: "M-10 0a10 10 0 1 0 20 0a10 10 0 1 0 -20 0M-5 -5L5 5M-5 5L5 -5" })));
@@ -89,7 +86,6 @@ dodo.map = (function () {
       const metres = Math.max(wide / (element.clientWidth || 1), high / (element.clientHeight || 1));
       now.setAttribute("d", trace(driven, time));
       own.setAttribute("transform", placed(pose(driven, time)));
-      if (other) other.setAttribute("transform", placed(pose(before, time)));
       for (const [body, shape, text, trail] of moving) {
         const at = pose(body, time);
         shape.setAttribute("transform", placed(at));
@@ -110,7 +106,7 @@ dodo.map = (function () {
 
   // Equal axes around paths and lines; far cones may fall outside.
   function whole() {
-    const points = [...driven.poses, ...before.poses, ...bodies.flatMap((body) => body.poses)].map(({ x, y }) => [x, y]);
+    const points = [...driven.poses, ...bodies.flatMap((body) => body.poses)].map(({ x, y }) => [x, y]);
     for (const each of lines) for (const [a, b, c, d] of each.lines) points.push([a, b], [c, d]);
     const [left, low] = [0, 1].map((n) => points.reduce((least, point) => Math.min(least, point[n]), Infinity) - length);
     const [right, high] = [0, 1].map((n) => points.reduce((most, point) => Math.max(most, point[n]), -Infinity) + length);
@@ -132,9 +128,7 @@ dodo.map = (function () {
     parent.lastChild.append(caption);
     dodo.cursor.follow((time) => {
       const { x, y, heading } = pose(driven, time);
-      const other = before.poses.length ? pose(before, time) : null;
-      const rest = other ? `; dashed: before (${window.dodoBefore.outcome}), ${number(Math.hypot(x - other.x, y - other.y))} m apart` : "";
-      caption.textContent = `x ${x.toFixed(2)} m, y ${y.toFixed(2)} m, heading ${((heading * 180) / Math.PI).toFixed(0)}°${rest}`;
+      caption.textContent = `x ${x.toFixed(2)} m, y ${y.toFixed(2)} m, heading ${((heading * 180) / Math.PI).toFixed(0)}°`;
     });
   }
 

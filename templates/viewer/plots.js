@@ -126,10 +126,8 @@ dodo.plots = (function () {
 
   function wheel(u, event) {
     event.preventDefault();
-    const wide = range[1] - range[0];
-    const [at, factor, way] = [u.posToVal(event.offsetX, "x"), Math.exp(event.deltaY / 500), (event.deltaX || event.deltaY) / 500];
-    if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) zoom(range[0] + way * wide, range[1] + way * wide);
-    else zoom(at - (at - range[0]) * factor, at + (range[1] - at) * factor);
+    const [at, factor] = [u.posToVal(event.offsetX, "x"), Math.exp(event.deltaY / 500)];
+    zoom(at - (at - range[0]) * factor, at + (range[1] - at) * factor);
   }
 
   // A chart in an element that fills it; `read` takes the time under the pointer, null where there is none.

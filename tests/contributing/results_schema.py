@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from dodo_dsl import outcome, package_data
-from dodo_dsl.report import repetitions, results
+from dodo_dsl.report import results
 from dodo_dsl.spec import model
 
 FILE = package_data.schemas() / "results.schema.json"
@@ -50,7 +50,7 @@ def simple(node: Any) -> Any:
 
 def described(name: str, node: Schema) -> Schema:
     """An object's schema with what its class says of each field; what is written has all fields but a few."""
-    kind: Any = next(vars(module)[name] for module in (outcome, results, repetitions, model) if name in vars(module))
+    kind: Any = next(vars(module)[name] for module in (outcome, results, model) if name in vars(module))
     properties = {key: {**simple(node["properties"][key]), "description": said} for key, said in texts(kind).items()}
     is_partly = kind is results.Results or issubclass(kind, dict)
     required = [key for key in properties if not is_partly or key in node["required"]]

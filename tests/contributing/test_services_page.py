@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.report import results
 from dodo_dsl.report.join import read_document
 from dodo_dsl.report.viewer.encoded import unpacked
 from tests.contributing.tutorial import follow
@@ -18,7 +19,8 @@ def test_it_can_be_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
     (tmp_path / "repository").mkdir()
     follow(PAGE, tmp_path / "repository", Path(sys.executable).parent)
-    data = read_document(tmp_path / "repository" / "dodo-report" / "sil-smooth" / "drive.js")
+    (outcome,) = results.load(tmp_path / "repository" / "dodo-report")
+    data = read_document(tmp_path / "repository" / "dodo-report" / "sil-smooth" / "drive.js", outcome)
     steps_over_time = next(each for each in data["judged"] if each["evaluator"] == "smooth")
     assert (steps_over_time["name"], steps_over_time["note"]) == ("Step of the steering", "at most 3 deg")
     assert unpacked(steps_over_time["values"]).max() > 3 and steps_over_time["marks"]

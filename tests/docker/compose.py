@@ -98,7 +98,7 @@ class Crate:
     def run(self, *jobs: Job, backend: str = "docker") -> dict[str, Outcome]:
         """The outcomes by slug without the mark, all at once."""
         backends = CombinedBackends(backend, subnets=SUBNETS)
-        runner = Runner(self.progress, backends, schedule(len(jobs), lambda job: 1.0), Policy())
+        runner = Runner(self.progress, backends, schedule(len(jobs)), Policy())
         return {o.slug.removeprefix(f"{self.mark}-"): o for o in asyncio.run(runner.run(jobs))}
 
     def start(self, job: Job, *flags: str, **variables: str) -> "subprocess.Popen[str]":

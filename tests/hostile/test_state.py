@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.run import leases
-from dodo_dsl.run.history import History
 from dodo_dsl.state_folder import UnsafeFolder
 from tests.hostile.command import STRANGER
 
@@ -52,15 +51,3 @@ def test_a_planted_symlink_is_not_written_through(folder: Path) -> None:
     with pytest.raises(OSError, match="symbolic links"):
         leases.try_lease("cid-130", {})
     assert victim.read_text() == "untouched"
-
-
-def test_history_follows_no_symlink_and_waits_for_no_fifo(tmp_path: Path) -> None:
-    victim = tmp_path / "victim"
-    victim.write_text("")
-    (tmp_path / "link").symlink_to(victim)
-    os.mkfifo(tmp_path / "fifo")
-    for name in ("link", "fifo"):
-        history = History(tmp_path / name)
-        history._saved = -1
-        history.save()
-    assert victim.read_text() == ""

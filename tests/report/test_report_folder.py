@@ -12,7 +12,7 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.outcome import Outcome, with_margin
 from dodo_dsl.report import results
 from dodo_dsl.report.files import SHARED, forget
-from dodo_dsl.report.report_folder import Drawable, draw_test, write_summaries
+from dodo_dsl.report.report_folder import draw_test, write_summaries
 from dodo_dsl.report.viewer import page as viewer_page
 from tests.report.joined.reports import draw
 from tests.run.helpers import Bench
@@ -36,7 +36,7 @@ def frame(x: float) -> bytes:
 def test_hostile_reasons_and_frames(tmp_path: Path, reason: str) -> None:
     recording(tmp_path / "report" / "test" / "test.rec", frame(0), b"\x0a\xff\xff\xff", frame(1), frame(float("nan")))
     outcome = replace(OUTCOME, reason=reason, last_lines=(reason,))
-    tested = {"test": Drawable(Bench(tmp_path).plan(), tmp_path)}
+    tested = {"test": (Bench(tmp_path).plan(), tmp_path)}
     assert draw(tmp_path / "report", [outcome], tested) == []
     assert results.load(tmp_path / "report" / "results.json") == [outcome]
     assert (tmp_path / "report" / "test" / "trajectory.png").is_file()
@@ -52,7 +52,7 @@ def test_a_snapshot_is_shown_beside_the_drive(tmp_path: Path) -> None:
     for slug in slugs[:2]:
         (tmp_path / slug / "snapshot.png").write_bytes(b"a picture")
     outcomes = [replace(OUTCOME, name=slug, slug=slug, level="hil") for slug in slugs]
-    draw(tmp_path, outcomes, {"drive": Drawable(Bench(tmp_path).plan(), tmp_path)})
+    draw(tmp_path, outcomes, {"drive": (Bench(tmp_path).plan(), tmp_path)})
     page, junit = ((tmp_path / name).read_text() for name in ("index.html", "junit.xml"))
     assert re.findall(r'src="(.*?)"', page) == ["drive/trajectory.png", "drive/snapshot.png", "look/snapshot.png"]
     assert [path.split("/", 1)[1] for path in re.findall(r"ATTACHMENT\|(.*?)]]", junit)] == [
@@ -65,7 +65,7 @@ def test_each_test_has_a_page(tmp_path: Path) -> None:
     recording(tmp_path / "report" / "drive" / "test.rec", frame(0), frame(1))
     outcomes = [replace(OUTCOME, name=slug, slug=slug) for slug in ("drive", "error")]
     plan = Bench(tmp_path).plan()
-    assert draw(tmp_path / "report", outcomes, dict.fromkeys(("drive", "error"), Drawable(plan, tmp_path))) == []
+    assert draw(tmp_path / "report", outcomes, dict.fromkeys(("drive", "error"), (plan, tmp_path))) == []
     page = (tmp_path / "report" / "index.html").read_text()
     assert re.findall(r'href="(.*?drive.html)"', page) == ["drive/drive.html", "error/drive.html"]
     forget(tmp_path / "report", ["drive", "error"])
@@ -89,7 +89,7 @@ def test_the_page_leads_to_spec_and_recording(tmp_path: Path, monkeypatch: pytes
     assert page.count('class="about"') == 1
     assert re.findall(r'href="([^"#]*)"', page) == ["data:,", "../../t/t.dodo.yml", "test/test.rec"]
     assert "<dt>Test</dt><dd>t/gone.dodo.yml</dd>" in page
-    assert '<span title="samples or detections that came too late to be judged, ignored"><b>late</b>' in page
+    assert '<span title="samples, detections or answers that came too late to count"><b>late</b>' in page
     assert "<b>mean</b> 2</span>" in page
     assert "<td>at most 0.75\u00a0s</td><td>0.25\u00a0s</td>" in page
 
@@ -132,7 +132,7 @@ def test_what_cannot_be_drawn_is_said_and_half_a_page_is_none(tmp_path: Path, mo
         raise OSError("no room")
 
     monkeypatch.setattr(viewer_page, "write_html", refuse)
-    assert draw_test(tmp_path, OUTCOME, Drawable(Bench(tmp_path).plan(), tmp_path)) == [
+    assert draw_test(tmp_path, OUTCOME, Bench(tmp_path).plan(), tmp_path) == [
         f"the page of {OUTCOME.name} cannot be written: no room"
     ]
     write_summaries(tmp_path, [OUTCOME])
@@ -143,6 +143,6 @@ def test_shared_files_are_written_through_no_symlink(tmp_path: Path) -> None:
     (tmp_path / "others").mkdir()
     (tmp_path / "report").mkdir()
     (tmp_path / "report" / SHARED).symlink_to(tmp_path / "others")
-    viewer_page.write_shared(tmp_path / "report", [])
+    viewer_page.write_shared(tmp_path / "report")
     assert list((tmp_path / "others").iterdir()) == []
     assert (tmp_path / "report" / SHARED / "main.js").is_file()

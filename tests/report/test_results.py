@@ -12,7 +12,6 @@ import pytest
 from dodo_dsl.outcome import MachineLoad, NotRun, Response, ServiceUse, Wait
 from dodo_dsl.report import results
 from dodo_dsl.report.files import forget
-from dodo_dsl.report.repetitions import Difference, Repeated
 from dodo_dsl.report.report_folder import write_summaries
 from dodo_dsl.report.results import GivenReport, Repository, RunRecord
 from dodo_dsl.spec.model import Goal
@@ -148,8 +147,7 @@ def test_the_first_problem_is_told_in_a_sentence(tmp_path: Path, tests: object) 
 
 def test_the_schema_is_what_the_classes_say_and_what_is_written_is_read(tmp_path: Path) -> None:
     assert results_schema.FILE.read_text() == results_schema.text(), "run `make schema`"
-    repeated = Repeated("a", ("a", "b"), (Difference("gap", ("1", "2")),))
-    text = results.to_json([WHOLE], circumstances := results.Circumstances((RUN,), (NOT_RUN,), (repeated,)))
+    text = results.to_json([WHOLE], circumstances := results.Circumstances((RUN,), (NOT_RUN,)))
     document = json.loads(text)
     jsonschema.validate(document, json.loads(results_schema.text()))
     (tmp_path / "results.json").write_text(text)

@@ -19,15 +19,14 @@ ROOT = Path(__file__).parents[2]
 
 
 class Desk:
-    """Compiled tests, a report folder, a lease folder, CIDs and a history of their own."""
+    """Compiled tests, a report folder, a lease folder and CIDs of their own."""
 
     def __init__(self, folder: Path, cids: range) -> None:
         self.folder = folder
         self._cids = cids
         (folder / "dodo.yml").write_text(f"dodo: 1\ncids: {cids[0]}-{cids[-1]}\n")
         self.bench = Bench(folder)
-        own = {"DODO_LEASES": str(folder / "leases"), "DODO_HISTORY": str(folder / "history.jsonl")}
-        self.environment = {**os.environ, **own}
+        self.environment = {**os.environ, "DODO_LEASES": str(folder / "leases")}
 
     def compiled(self, plan: Plan) -> Path:
         target = self.folder / "generated" / plan.slug

@@ -12,7 +12,6 @@ from pathlib import Path
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan, PlannedService
 from dodo_dsl.run.backends import Backends, CombinedBackends, Job
-from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
 from tests.run import scripted
@@ -54,8 +53,6 @@ class Recorded:
 
     notes: list[str] = field(default_factory=list)
     phases: list[tuple[str, str]] = field(default_factory=list)
-    rests: list[tuple[float, int]] = field(default_factory=list)
-    standings: list[tuple[str, Standing]] = field(default_factory=list)
 
     def __enter__(self) -> "Recorded":
         return self
@@ -69,14 +66,8 @@ class Recorded:
     def phase(self, slug: str, text: str) -> None:
         self.phases.append((slug, text))
 
-    def standing(self, slug: str, standing: Standing) -> None:
-        self.standings.append((slug, standing))
-
     def done(self, outcome: Outcome) -> None:
         self.phases.append((outcome.slug, outcome.outcome))
-
-    def rest(self, seconds: float, tests: int) -> None:
-        self.rests.append((seconds, tests))
 
 
 @dataclass
@@ -86,7 +77,6 @@ class Bench:
     folder: Path
     isolation: str | None = None
     progress: Recorded = field(default_factory=Recorded)
-    durations: dict[str, float] = field(default_factory=dict)
 
     def script(self, name: str, text: str) -> tuple[str, ...]:
         path = self.folder / f"{name}.py"
@@ -130,11 +120,8 @@ class Bench:
             backends = backends or CombinedBackends("process", cids, isolation=self.isolation)
             if self.isolation == "host":
                 plans = tuple(replace(plan, cid=cids[0]) for plan in plans)
-            self.runner = Runner(self.progress, backends, schedule(parallel, self.expected), policy or Policy())
+            self.runner = Runner(self.progress, backends, schedule(parallel), policy or Policy())
             return asyncio.run(self.runner.run(self.jobs(*plans)))
-
-    def expected(self, job: Job) -> float:
-        return self.durations.get(job.plan.slug, 1.0)
 
     def log(self, plan: Plan, name: str) -> str:
         return (self.folder / "report" / plan.slug / "logs" / f"{name}.log").read_text()

@@ -41,7 +41,6 @@ from dodo_dsl.run.protocol import (
     Unstartable,
     VerdictEvent,
 )
-from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.start_order import LONGEST_S
 from dodo_dsl.spec.model import ResourceLimits
 from tests.run.scripted import BUSY, FAILED, PASSED, READY, Events, ScriptedBackend, drives, load, plan, run
@@ -81,14 +80,6 @@ def test_that_it_has_passed_is_told_before_it_is_taken_down(verdict: VerdictEven
     told: list[str] = []
     run(Engine(backend.plan, backend, lambda _: None, passed=lambda: told.append(backend.calls[-1])).run(keep))
     assert told == (["begin"] if verdict is PASSED and not keep else [])
-
-
-def test_how_far_a_test_is_is_told_as_it_goes_on() -> None:
-    tested, told = plan(lockstep=60.0), list[Standing]()
-    events = [(0.5, Time(1.5, False)), (2.0, PASSED), (2.0, ENDED), (2.0, Time(2.0, True))]
-    backend = ScriptedBackend(tested, {**READY, "begin": events})
-    run(Engine(tested, backend, lambda _: None, stands=told.append).run())
-    assert told == [Standing(0.0, True), Standing(1.5, True), Standing(1.5, True)]
 
 
 def on(loads: Callable[[float], Snapshot | None], *events: tuple[float, Event], tested: Plan | None = None) -> Outcome:

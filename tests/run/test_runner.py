@@ -38,20 +38,19 @@ CRASHED = "service 'track' of layer evaluation ended with exit code 3 after 1.0 
 
 @dataclass
 class Scene:
-    """Runs tests in a folder; ``lengths`` are the expected seconds of those that take more than 1 s."""
+    """Runs tests in a folder."""
 
     folder: Path
     backends: ScriptedBackends = field(default_factory=ScriptedBackends)
     policy: Policy = field(default_factory=Policy)
     capacity: int = 4
-    lengths: dict[str, float] = field(default_factory=dict)
     progress: Recorded = field(default_factory=Recorded)
     signals: tuple[tuple[float, int], ...] = ()
     begins: list[tuple[float, int]] = field(default_factory=list)
     """When attempts began, and how many tests ran then."""
 
     def run(self, *plans: Plan, keep: bool = False) -> list[Outcome]:
-        order = Schedule(self.capacity, lambda _: 1, self._expected)
+        order = Schedule(self.capacity, lambda _: 1)
         self.runner = Runner(self.progress, self.backends, order, self.policy, keep)
         return run(self._run(jobs(self.folder, *plans)))
 
@@ -59,9 +58,6 @@ class Scene:
         for seconds, number in self.signals:
             send_signal_after(seconds, number)
         return await self.runner.run(given, lambda *_: None)
-
-    def _expected(self, job: Job) -> float:
-        return self.lengths.get(job.plan.slug, 1.0)
 
 
 @pytest.fixture
@@ -83,17 +79,17 @@ def by_slug(**stages: object) -> Callable[[Plan, int], ScriptedBackend]:
 
 
 def test_the_longest_begins_first_and_outcomes_keep_the_order_of_the_jobs(scene: Scene) -> None:
-    scene.lengths, scene.capacity = {"a": 1.0, "b": 3.0, "c": 2.0}, 1
-    assert [outcome.slug for outcome in scene.run(*plans("abc"))] == ["a", "b", "c"]
-    assert scene.backends.began[-1:] == ["a"]
+    scene.capacity = 1
+    given = [plan(name, timeout_s=seconds) for name, seconds in (("a", 10.0), ("b", 30.0), ("c", 20.0))]
+    assert [outcome.slug for outcome in scene.run(*given)] == ["a", "b", "c"]
+    assert scene.backends.began == ["b", "c", "a"]
     assert scene.progress.notes == ["prepared 3"]
-    assert [left for _, left in scene.progress.rests] == [2, 1]
     assert scene.backends.closed == 1
 
 
 @pytest.mark.parametrize(("fail_fast", "began"), [(True, ["a"]), (False, ["a", "b", "c"])])
 def test_fail_fast_begins_no_further_test(scene: Scene, fail_fast: bool, began: list[str]) -> None:
-    scene.lengths, scene.capacity, scene.policy = {"a": 3.0, "b": 2.0}, 1, Policy(fail_fast)
+    scene.capacity, scene.policy = 1, Policy(fail_fast)
     scene.backends.make = by_slug(a=drives(1.0, FAILED))
     outcomes = scene.run(*plans("abc"))
     assert (scene.backends.began, [outcome.slug for outcome in outcomes]) == (began, began)
@@ -174,7 +170,6 @@ def test_what_a_busy_machine_left_undecided_is_tried_again_alone(crowded: Scene)
     assert a.notes == (f"tried again alone, because the machine was too busy: {TOO_BUSY}",)
     assert crowded.begins == [(0.0, 1), (7.0, 1)], "when the others have ended"
     assert [slug for slug, text in crowded.progress.phases if text in ("passed", "failed", "error")][-1:] == ["a"]
-    assert [left for _, left in crowded.progress.rests] == [2, 1]
     report = crowded.folder / "report" / "a"
     assert (report / "attempts" / "1" / "logs" / "log").read_text() == "attempt 1"
     assert (report / "logs" / "log").read_text() == "attempt 2"

@@ -69,7 +69,6 @@ def repository(folder: Path, spec: str) -> Iterator[pytest.MonkeyPatch]:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.setenv("DODO_LEASES", str(folder / "leases"))
-        patch.setenv("DODO_HISTORY", str(folder / "history.jsonl"))
         yield patch
 
 

@@ -33,7 +33,7 @@ def unpacked(text: str) -> NDArray[np.float32]:
     return np.frombuffer(base64.b64decode(text, validate=True), "<f4")
 
 
-def script(document: Any, variable: str = VARIABLE) -> str:
+def script(document: Any) -> str:
     """A classic script that assigns a JSON value; only ASCII, and no character that begins a tag."""
     text = json.dumps(document, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    return "var " + variable + " = " + text.replace("<", "\\u003c") + ";\n"
+    return f"var {VARIABLE} = " + text.replace("<", "\\u003c") + ";\n"

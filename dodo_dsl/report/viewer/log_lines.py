@@ -59,12 +59,6 @@ def merged(folder: Path, test: RecordedTest) -> dict[str, Any]:
     return {"services": [shown(name, 80) for name in names], "lines": rows, "left": left}
 
 
-def complaints(folder: Path) -> Iterator[LogLine]:
-    """The errors and warnings in the logs of a test, service by service and without times."""
-    for log in sorted(folder.glob("*.log")):
-        yield from (line for _, line in _without_times(log) if line.level not in ("", INFO))
-
-
 def _lines(log: Path, test: RecordedTest) -> Iterator[LogLine]:
     offsets, walls = log_times.read(log)
     times = _test_times(walls, test)

@@ -1,7 +1,7 @@
 """A test's page: the data of its drive, the lines of the spec that set each limit, and what all pages share."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +26,14 @@ from dodo_dsl.plan.added_services import RECORDING
 from dodo_dsl.plan.model import Place, Plan, PlannedService
 from dodo_dsl.report import checks as words
 from dodo_dsl.report import trajectory
-from dodo_dsl.report.files import BEFORE, DATA, FAILED, FAILED_VARIABLE, LOGS, PAGE, SHARED, TRAJECTORY
+from dodo_dsl.report.files import DATA, LOGS, PAGE, SHARED, TRAJECTORY
 from dodo_dsl.report.trajectory import Ground, Way, colour_of, ground_of
-from dodo_dsl.report.viewer import log_lines, moment, pictures, recorded, units
+from dodo_dsl.report.viewer import log_lines, moment, pictures, recorded
 from dodo_dsl.report.viewer.encoded import packed, script, shown
 from dodo_dsl.report.viewer.pictures import Replayed, Video
 from dodo_dsl.report.viewer.record import read
 from dodo_dsl.report.viewer.recorded import FRAME, Channel, RecordedTest
+from dodo_dsl.report.viewer.units import title_of, unit_of
 
 _OF_THE_TEST = {SLOW_ANSWERS: "max", SAMPLE_TIMES: "sample-times"}
 """Checks of no evaluator, and the key of the test's ``response`` that asks for them."""
@@ -79,7 +80,6 @@ class SpecLines:
 
 def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters) -> Iterator[dict[str, Any]]:
     """All checks, each with the places of its limit: the parameter's, or the service's where it is set by default."""
-    names = {check["name"] for check in outcome.checks}
     for check in outcome.checks:
         places = list(limit_places(plan, check["name"], recorded)) if check.get("limit") else []
         yield {
@@ -88,7 +88,7 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters)
             "limits": [shown(limit, 80) for limit in words.limits(check)],
             "ok": bool(check["ok"]),
             "follows": words.only_follows(check, outcome.checks),
-            "meaning": shown(words.meaning(check, names), 200),
+            "meaning": shown(words.meaning(check), 200),
             "bar": words.bar_place(check),
             "places": [
                 {"file": shown(place.file, 400), "line": place.line, "text": lines.line(place), "flag": flag}
@@ -125,21 +125,15 @@ def _parameters(service: PlannedService, check: str, recorded: Parameters) -> li
 VERSION = 4
 _MOST = 20_000
 """Points and lines of a map that are drawn."""
-_OF_BEFORE = f'<script defer src="{BEFORE}"></script>\n'
 
 
-def write_shared(report: Path, outcomes: Sequence[Outcome]) -> None:
-    """What all pages of a report use, and which of its ``outcomes`` with a page did not pass; raises OSError.
-
-    Nothing is written through a symlink.
-    """
+def write_shared(report: Path) -> None:
+    """What all pages of a report use; raises OSError. Nothing is written through a symlink."""
     if (report / SHARED).is_symlink():
         (report / SHARED).unlink()
     for source in sorted(_sources().iterdir()):
         if source.name != PAGE:
             atomic.write_bytes(report / SHARED / source.name, source.read_bytes())
-    failed = [[o.slug, shown(o.name), o.outcome] for o in outcomes if o.outcome != "passed"]
-    atomic.write_text(report / SHARED / FAILED, script(failed, FAILED_VARIABLE))
 
 
 def write(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> None:
@@ -181,11 +175,8 @@ def write(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> None:
 
 
 def write_html(folder: Path) -> None:
-    """The page alone: the same for all tests, but for whether there is a path to compare with. Raises OSError."""
-    text = (_sources() / PAGE).read_text(encoding="utf-8")
-    if not (folder / BEFORE).is_file():
-        text = text.replace(_OF_BEFORE, "")
-    atomic.write_text(folder / PAGE, text)
+    """The page alone: the same for all tests. Raises OSError."""
+    atomic.write_bytes(folder / PAGE, (_sources() / PAGE).read_bytes())
 
 
 def _path(test: RecordedTest, sender: int) -> trajectory.Points:
@@ -255,6 +246,7 @@ def _facts(outcome: Outcome) -> dict[str, Any]:
 
 
 def _channel(channel: Channel) -> dict[str, Any]:
+    of = f" of {channel.message.rpartition('.')[2]}{f'/{channel.sender}' if channel.sender else ''}"
     numbers = {name: values for name, values in channel.fields.items() if not isinstance(values, list)}
     return {
         "message": channel.message,
@@ -264,8 +256,8 @@ def _channel(channel: Channel) -> dict[str, Any]:
         "fields": [
             {
                 "name": name,
-                "title": units.title(channel.message, name, channel.sender),
-                "unit": units.unit(channel.message, name),
+                "title": title_of(f"{name}{of}"),
+                "unit": unit_of(f"{name}{of}"),
                 "values": packed(values),
             }
             for name, values in numbers.items()

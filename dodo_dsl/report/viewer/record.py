@@ -19,7 +19,7 @@ from dodo_dsl.report import checks
 from dodo_dsl.report.trajectory import Way
 from dodo_dsl.report.viewer.encoded import packed, shown
 from dodo_dsl.report.viewer.recorded import MICROSECONDS, Values
-from dodo_dsl.report.viewer.units import of_series
+from dodo_dsl.report.viewer.units import title_of, unit_of
 
 _BOX = {"hit": 6, "false": 5, "missed": 5}
 """Kinds of boxes, and how many texts and numbers each has after its kind."""
@@ -52,14 +52,20 @@ class Line(msgspec.Struct):
 
     def about(self, evaluator: str) -> dict[str, Any]:
         """A plot without its samples."""
-        name, known = of_series(shown(self.series, 200))
-        unit = shown(self.unit, 40) or known
+        signal = shown(self.series, 200)
+        name, unit = title_of(signal), shown(self.unit, 40) or unit_of(signal)
         notes = [f"band ±{self.band:.4g}"] if self.band is not None else []
         notes += [checks.bound("min", self.low, unit, self.exclusive)] if self.low is not None else []
         notes += [checks.bound("max", self.high, unit, self.exclusive)] if self.high is not None else []
         notes += [f"distance {checks.bound('max', self.distance, unit)}"] if self.distance is not None else []
         limits = {name: getattr(self, name) for name in ("low", "high", "distance", "band")}
-        return {"evaluator": shown(evaluator, 80), "name": name, "unit": unit, **limits, "note": ", ".join(notes)}
+        return {
+            "evaluator": shown(evaluator, 80),
+            "name": name,
+            "unit": unit,
+            **limits,
+            "note": ", ".join(notes),
+        }
 
     def part(self) -> tuple[Values, Values, bytes]:
         """Times in us of the test, values and marks."""

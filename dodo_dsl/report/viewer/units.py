@@ -1,42 +1,30 @@
 """Units and titles of what is plotted: OpenDLV's messages name neither."""
 
-from dodo_dsl.report.viewer.recorded import FRAME
-
 UNITS = {
     "groundSteering": "rad", "groundSpeed": "m/s", "angle": "rad", "distance": "m", "voltage": "V", "temperature": "°C",
     "pressure": "Pa", "heading": "rad", "northHeading": "rad", "latitude": "deg", "longitude": "deg",
     "vx": "m/s", "vy": "m/s", "vz": "m/s", "rollRate": "rad/s", "pitchRate": "rad/s", "yawRate": "rad/s",
     "accelerationX": "m/s²", "accelerationY": "m/s²", "accelerationZ": "m/s²",
     "angularVelocityX": "rad/s", "angularVelocityY": "rad/s", "angularVelocityZ": "rad/s",
+    "x of Frame": "m", "y of Frame": "m", "z of Frame": "m",
 }  # fmt: skip
-"""By the names of fields."""
-_OF_FRAMES = {"x": "m", "y": "m", "z": "m"}
+"""By a field's name, or that with its message's."""
 _TITLES = {
-    "opendlv.proxy.GroundSteeringRequest": "Steering",
-    "opendlv.proxy.PedalPositionRequest": "Pedal position",
-    "opendlv.proxy.GroundSpeedRequest": "Speed request",
-    "opendlv.proxy.GroundSteeringReading": "Measured steering",
-    "opendlv.proxy.GroundSpeedReading": "Measured speed",
+    "groundSteering of GroundSteeringRequest": "Steering",
+    "position of PedalPositionRequest": "Pedal position",
+    "groundSpeed of GroundSpeedRequest": "Speed request",
+    "groundSteering of GroundSteeringReading": "Measured steering",
+    "groundSpeed of GroundSpeedReading": "Measured speed",
 }
 """Of messages with one field."""
 
 
-def unit(message: str, field: str) -> str:
-    """Empty if it is not known."""
-    return _OF_FRAMES.get(field, "") if message == FRAME else UNITS.get(field, "")
+def unit_of(signal: str) -> str:
+    """Of ``groundSteering of GroundSteeringRequest/2``; empty if it is not known."""
+    return UNITS.get(signal.partition("/")[0]) or UNITS.get(signal.partition(" of ")[0], "")
 
 
-def title(message: str, field: str, sender: int) -> str:
-    """``Steering``, ``vx of KinematicState``, ``distance of DistanceReading/2``"""
-    name = message.rpartition(".")[2]
-    stamp = f"/{sender}" if sender else ""
-    return f"{_TITLES[message]}{stamp}" if message in _TITLES else f"{field} of {name}{stamp}"
-
-
-def of_series(name: str) -> tuple[str, str]:
-    """Title and unit of what an evaluator calls ``groundSteering of GroundSteeringRequest/0``; else its own name."""
-    field, _, message = name.partition(" of ")
-    short, _, sender = message.partition("/")
-    known = next((full for full in _TITLES if full.endswith(f".{short}")), "")
-    own = title(known, field, int(sender)) if known and sender.isascii() and sender.isdigit() else name
-    return own, UNITS.get(field, "")
+def title_of(signal: str) -> str:
+    """``Steering/2`` of ``groundSteering of GroundSteeringRequest/2``; others keep their names."""
+    name, _, sender = signal.partition("/")
+    return f"{_TITLES[name]}/{sender}".removesuffix("/0").removesuffix("/") if name in _TITLES else signal

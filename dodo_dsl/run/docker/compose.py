@@ -96,7 +96,7 @@ class Compose:
     def read(self) -> None:
         """Fills ``services``; raises BackendError."""
         if shutil.which("docker") is None:
-            raise BackendError(f"there is no program 'docker': {advice.docker()}")
+            raise BackendError(f"there is no program 'docker': {advice.DOCKER}")
         try:
             self._outside = variables_of(self.plan.application, self.folder)
             self.services = with_images(self.plan.application, self._outside)
@@ -112,7 +112,7 @@ class Compose:
         """Raises BackendError where the docker command cannot compose."""
         code, _ = await self.run("version")
         if code:
-            raise BackendError(f"the docker command has no 'compose' of version 2: {advice.docker_plugin('compose')}")
+            raise BackendError(f"the docker command has no 'compose' of version 2: {advice.DOCKER}")
 
     def _require_own(self) -> None:
         """Raises BackendError if a path of the application leads elsewhere than when the test was compiled."""

@@ -56,7 +56,7 @@ def test_a_harmless_stream_lets_colours_through_and_nothing_of_others() -> None:
 def test_a_summary_says_the_same_with_colours() -> None:
     terminal, file = Terminal(), StringIO()
     for stream in (terminal, file):
-        run_report.write_summary(stream, [OUTCOME], {"test": "test"}, [])
+        run_report.write_summary(stream, [OUTCOME], [])
     assert RED in terminal.getvalue()
     assert shown(terminal.getvalue()) == file.getvalue()
     assert GREEN not in terminal.getvalue(), "there is no test that passed"

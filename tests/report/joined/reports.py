@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.report.report_folder import Drawable, draw_test, write_summaries
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.report.report_folder import draw_test, write_summaries
 from dodo_dsl.report.viewer import page
 from dodo_dsl.report.viewer.encoded import script
 
@@ -23,9 +24,9 @@ def check(value: float | None, ok: bool | None = None, unit: str = "m", name: st
     return {"name": name, "value": value, "limit": limit, "unit": unit, "ok": kept if ok is None else ok}
 
 
-def draw(folder: Path, outcomes: Sequence[Outcome], tests: Mapping[str, Drawable]) -> list[str]:
+def draw(folder: Path, outcomes: Sequence[Outcome], tests: Mapping[str, tuple[Plan, Path]]) -> list[str]:
     """A report as a run writes it, with sentences on what could not be drawn."""
-    problems = [problem for o in outcomes if o.slug in tests for problem in draw_test(folder, o, tests[o.slug])]
+    problems = [problem for o in outcomes if o.slug in tests for problem in draw_test(folder, o, *tests[o.slug])]
     write_summaries(folder, outcomes)
     return problems
 

@@ -147,7 +147,7 @@ def test_a_job_without_a_whole_report_is_named_and_the_others_are_drawn(
 
 
 def test_what_is_too_large_or_refused_is_left_out(api: Api, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(child_jobs, "MOST_BYTES", 100)
+    monkeypatch.setattr(child_jobs, "_MOST_BYTES", 100)
     api.refused = "jobs/2/artifacts"
     said = fetched(api, tmp_path / "target")[1]
     assert said[1:] == [

@@ -5,17 +5,14 @@ import os
 import re
 from html import unescape
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from dodo_dsl import atomic
 from dodo_dsl.report import join as report_join
 from dodo_dsl.report import results
-from dodo_dsl.report.comparison import compare
-from dodo_dsl.report.join import join, write_other_paths
+from dodo_dsl.report.join import join
 from dodo_dsl.report.report_folder import write_summaries
-from dodo_dsl.report.viewer.encoded import packed, script
 from tests.report.joined.reports import PASSED, drive, named, tree, write
 
 
@@ -60,7 +57,7 @@ def test_every_link_leads_to_a_file_of_the_report(tmp_path: Path, jobs: tuple[Pa
     out = tmp_path / "out"
     joined(out, *jobs)
     index = links(out / "index.html")
-    assert len(index) == 4 * 4 + 2  # page, recording, log, picture, and the cells of a matrix
+    assert len(index) == 4 * 4 + 2  # page, recording, log, picture; and the cells of both with one name
     for page in (out / "index.html", *out.glob("*/drive.html")):
         for link in links(page):
             target = (page.parent / link).resolve()
@@ -73,7 +70,6 @@ def test_a_report_is_replaced_and_files_of_others_stay(tmp_path: Path, jobs: tup
     joined(out, jobs[0])
     (out / "mine.txt").write_text("mine")
     (out / "a" / "mine.txt").write_text("mine")
-    (out / "history.json").write_text("{}")
     joined(out, jobs[1])
     assert sorted(path.name for path in out.iterdir()) == [
         "_viewer", "a", "b", "c--light-dark", "index.html", "junit.xml", "metrics.txt", "mine.txt", "results.json",
@@ -183,15 +179,6 @@ def test_pages_are_those_of_this_dodo(tmp_path: Path) -> None:
     assert {**tree(tmp_path / "out"), "junit.xml": b""} == {**expected, "junit.xml": b""}
 
 
-def test_what_is_too_large_is_left_out(tmp_path: Path) -> None:
-    folder = write(tmp_path / "in", [PASSED])
-    with (folder / "test" / "test.rec").open("wb") as file:
-        file.truncate(report_join.MOST_BYTES + 1)
-    (large,) = joined(tmp_path / "out", folder)
-    assert large.endswith("/test.rec is left out: its 17179869185 bytes would make the report larger than 16 GiB")
-    assert (tmp_path / "out" / "test" / "trajectory.png").is_file()
-
-
 def test_results_alone_are_joined_without_files(tmp_path: Path) -> None:
     folder = write(tmp_path / "in", [PASSED])
     (folder / "results.json").rename(folder / "main.json")
@@ -220,51 +207,3 @@ def test_a_failed_join_leaves_the_earlier_report(tmp_path: Path, monkeypatch: py
     with pytest.raises(OSError, match="No space"):
         joined(out, folder)
     assert tree(tmp_path) == before
-
-
-def path_of(**changes: Any) -> dict[str, Any]:
-    fields = [{"name": name, "values": packed([0.0, 1.0])} for name in (*report_join.FIELDS, "more")]
-    channel = {"message": "opendlv.sim.Frame", "sender": 2, "every": 1, "times": packed([0.0, 0.1]), "fields": fields}
-    document = json.loads(drive(PASSED).partition("= ")[2].rstrip(";\n"))
-    frame = {"message": "opendlv.sim.Frame", "sender": 2}
-    return {**document, "scene": {"frame": frame}, "channels": [{**channel, **changes}]}
-
-
-def compared(folder: Path, data: str) -> Path:
-    """The folder of a test, compared with that of a report whose ``drive.js`` has this text."""
-    write(folder / "new", [named("a", outcome="failed"), named("b")])
-    write(folder / "old", [named("a")])
-    (folder / "old" / "a" / "drive.js").write_text(data)
-    given = results.read_given(folder / "old")
-    write_other_paths(folder / "new", compare(results.load(folder / "new"), given), given)
-    return folder / "new" / "a"
-
-
-def test_the_path_is_beside_the_page_until_nothing_is_compared(tmp_path: Path) -> None:
-    place = compared(tmp_path, script(path_of()))
-    document = json.loads((place / "before.js").read_text().removeprefix("var dodoBefore = ").rstrip(";\n"))
-    assert (document["outcome"], document["times"]) == ("passed", packed([0.0, 0.1]))
-    assert [field["name"] for field in document["fields"]] == list(report_join.FIELDS)
-    assert 'src="before.js"' in (place / "drive.html").read_text()
-    assert not (place.parent / "b" / "before.js").exists()
-    write_other_paths(place.parent, None, None)
-    assert not (place / "before.js").exists()
-    assert "before.js" not in (place / "drive.html").read_text()
-
-
-NO_PATH = [
-    "alert(1)",
-    script(path_of()) + "alert(1)",
-    script(path_of(times="<script>")),
-    script(path_of(times=packed([0.0]))),
-    script(path_of(fields=3)),
-    script({**path_of(), "scene": []}),
-    script({**path_of(), "version": 0}),
-]
-
-
-@pytest.mark.parametrize("data", NO_PATH, ids=range(len(NO_PATH)))
-def test_what_is_no_path_is_left_out(tmp_path: Path, data: str) -> None:
-    place = compared(tmp_path, data)
-    assert not (place / "before.js").exists()
-    assert "before.js" not in (place / "drive.html").read_text()

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.report.comparison import compare
-from dodo_dsl.report.join import join, write_other_paths
+from dodo_dsl.report.join import join
 from dodo_dsl.report.report_folder import write_summaries
 from dodo_dsl.report.results import read_given
 from tests.report.viewer import drives, failures
@@ -33,29 +32,3 @@ def test_each_drive_is_replayed_from_the_joined_report(chromium: Chromium, tmp_p
         assert [url for url in page.requests if not url.startswith((out.as_uri(), "data:,"))] == []
     assert outcomes[1].slug == "test-0--report-2"
     assert (out / "test-0--report-2" / "camera-0.mp4").is_file()
-
-
-@pytest.mark.slow
-@pytest.mark.xdist_group("chromium")
-def test_the_paths_of_two_reports_are_drawn_over_one_another(chromium: Chromium, tmp_path: Path) -> None:
-    (tmp_path / "old").mkdir()
-    drives.write(tmp_path / "old" / "report", [failures.timed_out()])
-    outcomes = drives.write(tmp_path / "report", [failures.wall_hit()])
-    other = read_given(tmp_path / "old" / "report")
-    comparison = compare(outcomes, other)
-    address = (tmp_path / "report" / "test-0" / "drive.html").as_uri()
-    write_other_paths(tmp_path / "report", comparison, other)
-    with chromium.page(address) as page:
-        assert page.value("document.querySelectorAll('.map .earlier').length") == 2
-        page.value("dodo.cursor.move(2)")
-        caption = page.value("document.querySelector('#scene .caption').textContent")
-        assert caption.endswith("dashed: before (failed), 0.802 m apart")
-        assert page.faults == []
-        both = page.pixels()
-    write_other_paths(tmp_path / "report", None, None)
-    with chromium.page(address) as page:
-        page.value("dodo.cursor.move(2)")
-        assert page.value("document.querySelectorAll('.map .earlier').length") == 0
-        assert "dashed" not in page.value("document.querySelector('#scene .caption').textContent")
-        assert page.faults == []
-        assert (page.pixels() != both).any(axis=2).sum() > 500

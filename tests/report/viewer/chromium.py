@@ -27,7 +27,7 @@ _NAVIGATED = (
     "Cannot find context",
     "Promise was collected",
 )
-KEYS = {"ArrowLeft": 37, "ArrowRight": 39, "Home": 36, "End": 35, " ": 32, "d": 68, "n": 78, "p": 80, "?": 191}
+KEYS = {"ArrowLeft": 37, "ArrowRight": 39, "Home": 36, "End": 35, " ": 32, "d": 68}
 
 
 class Navigated(Exception):

@@ -18,7 +18,6 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording_writer import RecordingWriter
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.report.report_folder import Drawable
 from services.base import Context, Service
 from services.base.flags import load_manifest, parse
 from services.base.service import Build
@@ -69,7 +68,7 @@ def write(report: Path, drives: Iterable[MadeDrive]) -> list[Outcome]:
         plan = shipped(drive.slug)
         slug = f"test-{number}"
         outcomes.append(outcome_of(drive, slug))
-        tests[slug] = Drawable(replace(plan, slug=slug), compiled)
+        tests[slug] = (replace(plan, slug=slug), compiled)
         record(report / slug / "test.rec", drive)
         log(report / slug / "logs", drive)
         judge(report / slug / "logs", plan, compiled, drive)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from dodo_dsl.report.trajectory import Way, ground_of
-from dodo_dsl.report.viewer import encoded, page, units
+from dodo_dsl.report.viewer import encoded, page
 from dodo_dsl.report.viewer import recorded as recorded_test
 from dodo_dsl.report.viewer.record import JudgedRecord, read
-from dodo_dsl.report.viewer.units import of_series
+from dodo_dsl.report.viewer.units import title_of, unit_of
 from services.base import Judged, JudgedBoxes
 from services.base import judged as recording
 from tests.report.viewer import drives, failures
@@ -132,8 +132,11 @@ def test_the_path_is_that_of_one_sender(tmp_path: Path) -> None:
         assert page._path(test, sender)[:, 0].tolist() == [x] * 3
 
 
-def test_what_a_message_is_called_is_its_title() -> None:
-    assert of_series("groundSteering of GroundSteeringRequest/2") == ("Steering/2", "rad")
-    assert of_series("Distance to the walls") == ("Distance to the walls", "")
-    assert units.title("opendlv.sim.KinematicState", "vx", 0) == "vx of KinematicState"
-    assert units.unit("opendlv.sim.Frame", "x") == "m"
+def test_units_are_those_of_fields_and_titles_are_short() -> None:
+    signals = ("groundSteering of GroundSteeringRequest/2", "x of Frame/1", "x of Cone", "Distance to the walls")
+    assert [unit_of(signal) for signal in signals] == ["rad", "m", "", ""]
+    assert [title_of(signal) for signal in (*signals, "groundSteering of GroundSteeringRequest/0")] == [
+        "Steering/2",
+        *signals[1:],
+        "Steering",
+    ]

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl import advice
 from dodo_dsl.run import capabilities
 from dodo_dsl.run.capabilities import rigs
 from dodo_dsl.run.rigs.leases import quarantine
@@ -26,7 +27,7 @@ def test_whether_the_emulated_rig_is_built(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setenv(capabilities.FIRMWARE, str(tmp_path))
     (found,) = capabilities.emulated_rig()
     assert (found.state, found.text) == ("warning", f"is not built: it is not in {tmp_path}; hil tests need it")
-    assert found.advice == f"DODO_FIRMWARE is {tmp_path}: build it there, or unset DODO_FIRMWARE"
+    assert found.advice == advice.FIRMWARE
     for name in ("rig-emulator", "gantry.elf"):
         (tmp_path / name).write_bytes(b"")
     (found,) = capabilities.emulated_rig()
@@ -34,7 +35,7 @@ def test_whether_the_emulated_rig_is_built(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_a_user_without_a_home_folder_gets_advice(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("HOME", "XDG_STATE_HOME", "DODO_HISTORY", "DODO_RIGS"):
+    for name in ("HOME", "XDG_STATE_HOME", "DODO_RIGS"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr("os.getuid", lambda: 3_999_999_999)
     (found,) = rigs()

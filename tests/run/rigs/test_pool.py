@@ -126,8 +126,8 @@ def test_the_outcome_names_the_rig() -> None:
 
     held = leases.try_lease("cid-121", {"test": "theirs"})
     assert held is not None
-    quiet = SimpleNamespace(phase=lambda *_: None, standing=lambda *_: None)
-    runner = Runner(cast(Any, quiet), cast(Any, Backends()), schedule(1, lambda _: 1.0), Policy())
+    quiet = SimpleNamespace(phase=lambda *_: None)
+    runner = Runner(cast(Any, quiet), cast(Any, Backends()), schedule(1), Policy())
     outcome = run(runner._outcome(pool()))
     held.release()
     assert (outcome.outcome, outcome.slug, outcome.notes) == ("passed", "any", ("ran on rig 'kiwi-2'",))
