@@ -129,7 +129,7 @@ def _share(text: str) -> float:
     except ValueError:
         share = 0
     if not 0 < share < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is no share, expected e.g. 20%")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a share, expected for example 20%")
     return share
 
 
