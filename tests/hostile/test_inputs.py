@@ -13,11 +13,9 @@ READERS = {
     "cut": ("rec", "cut", "{}", "-o", "new.rec"),
     "export": ("rec", "export", "{}", "--csv"),
     "messages": ("rec", "info", "drive.rec", "--messages", "{}"),
-    "truth": ("rec", "export", "drive.rec", "--coco", "--truth", "{}", "-o", "out"),
     "judge": ("judge", "{}", "--spec", "sil-closed-straight"),
     "application": ("compile", "--check", "--application", "{}"),
     "spec": ("compile", "--check", "{}"),
-    "picture": ("rig", "truth", "emulated", "-o", "t.json", "--picture", "{}", "--box", "a", "1", "1", "2", "2"),
 }
 """Commands that read a file; each has to end at once, with a sentence that names it."""
 

@@ -7,17 +7,17 @@ from pathlib import Path
 import pytest
 
 from tests.hostile.command import dodo
-from tests.rec.conftest import dodo_rec, video
+from tests.rec.conftest import BEGIN, dodo_rec, video
 
 ROOT = Path(__file__).parents[2]
 
 
-WRITTEN = {"cut": "new.rec", "--csv": "opendlv.proxy.ImageReading-0.csv", "--all": "annotations.json"}
+WRITTEN = {"cut": "new.rec", "--csv": "opendlv.proxy.ImageReading-0.csv", "--frames": f"0-{BEGIN}.png"}
 """The files that commands write, by their last word."""
 
 
 @pytest.mark.parametrize("kind", ["fifo", "socket", "device", "link", "folder"])
-@pytest.mark.parametrize("words", [("cut",), ("export", "--csv"), ("export", "--coco", "--all")], ids=" ".join)
+@pytest.mark.parametrize("words", [("cut",), ("export", "--csv"), ("export", "--frames")], ids=" ".join)
 def test_a_command_replaces_nothing_but_files(
     record: Callable[..., Path], strange: dict[str, Path], kind: str, words: tuple[str, ...], tmp_path: Path
 ) -> None:

@@ -163,7 +163,7 @@ def test_a_recording_ends_at_its_limit_and_names_what_fills_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "test.rec"
-    with closing(RecordingFile(path, None, Traffic(100_000, Clock(), lambda: 0, lambda id_: f"a.M{id_}"))) as recording:
+    with closing(RecordingFile(path, Traffic(100_000, Clock(), lambda: 0, lambda id_: f"a.M{id_}"))) as recording:
         recording.write(envelope(7))
         with pytest.raises(FloodError, match=r"the recording would be larger than 0\.1 MB, most of it a\.M9/3"):
             for _ in range(2000):

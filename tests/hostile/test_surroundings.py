@@ -52,7 +52,7 @@ def test_paths_that_are_not_utf_8(tmp_path: Path, record: Callable[..., Path], m
     (folder / "dodo.yml").write_text(f"dodo: 1\napplication: {ROOT}/examples/kiwi/docker-compose.yml\n")
     commands = (
         ("rec", "info", drive), ("rec", "info", drive, "--json"), ("rec", "cut", drive, "-o", folder / "new.rec"),
-        ("rec", "export", drive, "--csv"), ("rec", "export", drive, "--coco", "--all", "-o", folder / "coco"),
+        ("rec", "export", drive, "--csv"), ("rec", "export", drive, "--coco", "-o", folder / "coco"),
         ("judge", drive, "--spec", "sil-closed-straight"), ("list", "--json"), ("compile", "--check", folder),
         ("compile", "sil-closed-straight", "-o", folder / "generated"), ("new", "sil-mine"), ("report", folder),
         ("compile", "--check", folder / "none"), ("explain", str(folder / "none")),

@@ -10,7 +10,7 @@ import pytest
 
 from dodo_dsl.opendlv.envelope import Envelope
 from services.base import JudgedTime, UnjudgeableError, Verdict
-from services.rec_replay.selection import Selection, select
+from services.rec_replay.selection import select
 from services.responds.model import of_recording
 from tests.services.built import MESSAGES, built, hand, hide, refusal
 from tests.services.rec_replay.recordings import IMAGE, T0, message, write
@@ -131,7 +131,7 @@ def test_frames_are_due_as_the_player_shows_them(tmp_path: Path, timemod: float)
     random = np.random.default_rng(5)
     path = pictures(tmp_path, *np.cumsum(random.exponential(0.7, 60)))
     with Recording(path) as recording:
-        part = select(recording, Selection(start=3, end=30, video_sender=2), MESSAGES, 800_000, timemod)
+        part = select(recording, MESSAGES, 800_000, start=3, end=30, camera=2, timemod=timemod)
     frames = of_recording(path, 2, 3, 30, 0.8, timemod)
     assert len(frames.due) > 20 and frames.due.tolist() == part.due[part.shown].tolist()
 
