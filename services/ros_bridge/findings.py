@@ -46,6 +46,11 @@ def problems(graph: RosGraph, seen: Discovered, waited: float) -> Iterator[Findi
         for topic in topics:
             for other in seen.of(topic.topic, not given):
                 yield from _mismatch(topic, end_of(topic, given), other, seen.name(other))
+    for topic in graph.sent:
+        if len(publishers := seen.of(topic.topic, True)) > 1:
+            names = seen.name(*publishers)
+            who = f"{names} publish" if " and " in names else f"{names} has {len(publishers)} publishers"
+            yield Finding(("crowd", topic.topic), f"{who} on {topic.topic}: the last message counts; let one publish")
     if not seen.participants and not seen.left and waited >= ALONE:
         services = listed({f"'{name}'" for names in graph.services.values() for name in names})
         text = f"no ROS node is in the graph: the programs of {services or 'the application'} ended, or have another"

@@ -53,6 +53,8 @@ def graph_of(*ends: tuple[str, str, bool], node: str = "lane", seen: Discovered 
             graph_of(READS, ("/cmd_vel_stamped", "geometry_msgs/msg/TwistStamped", True)),
             ["/cmd_vel_stamped as geometry_msgs/msg/TwistStamped: remap it (--ros-args -r /cmd_vel_stamped:=/cmd_vel)"],
         ),
+        (graph_of(READS, WRITES, WRITES), ["'lane' has 2 publishers on /cmd_vel: the last message counts"]),
+        (graph_of(READS, WRITES, node="", seen=graph_of(WRITES)), ["'lane' and a program publish on /cmd_vel"]),
         (
             # a chain of two nodes has its own topics
             graph_of(

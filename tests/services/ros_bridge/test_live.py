@@ -141,6 +141,7 @@ WRONG = RosGraph(
     ),
     sent=(
         topic("/cmd_vel", TWIST, MOTION_REQUEST),
+        topic("/cmd_two", TWIST, MOTION_REQUEST),
         topic("/cmd_type", TWIST, MOTION_REQUEST),
         topic("/cmd_quality", TWIST, MOTION_REQUEST, reliability="reliable"),
         topic("/frame", POSE, POSE_ESTIMATE),
@@ -156,10 +157,12 @@ WRONG_PEERS = {
         end("/scan", SCAN),
         end("/map_scan", SCAN, durable=True),
         end("/cmd_vel_raw", TWIST, fields=VX),
+        end("/cmd_two", TWIST, fields=VX),
         end("/cmd_type", STAMPED, age=0.0, fields={}),
         end("/cmd_quality", TWIST, fields=VX, reliable=False),
     ],
     "teleop": [
+        end("/cmd_two", TWIST, fields=VX),
         end("/frame", POSE, age=0.0, fields={**QX, "header.frame_id": "camera"}),
         end("/unstamped", POSE, fields=QX),
         end("/old", POSE, age=7200.0, fields=QX),
@@ -178,6 +181,7 @@ SENTENCES = [
     "write 'qos: {reliability: best_effort}' at the topic",
     "'lane' publishes /cmd_type as geometry_msgs/msg/TwistStamped, the test has geometry_msgs/msg/Twist: "
     "write one type in both ('ros: out')",
+    "'lane' and 'teleop' publish on /cmd_two: the last message counts; let one publish",
     "/frame comes in frame 'camera'; expected 'map' (from 'teleop')",
     "/unstamped comes without a stamp; expected that of what it answers (header.stamp) (from 'teleop')",
     "the stamps of /old are 7200.N s behind the test's time: copy header.stamp of what it answers, "
