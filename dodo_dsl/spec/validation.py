@@ -256,7 +256,7 @@ def _additional(v: Violation) -> Iterator[Diagnostic]:
     known = v.schema.get("properties", {})
     for *_, name in itertools.islice(v.places, MAX_PROBLEMS):
         slip, hint = unknown_key(str(name), known)
-        if not hint and not slip and set(known) == {"uses", "with"}:
+        if not slip and not closest(str(name), known) and set(known) == {"uses", "with"}:
             hint = f"parameters of a service belong into 'with': {{{name}: ...}}"
         elif not slip:
             hint = home(str(name), v.entries, v.schema) or hint

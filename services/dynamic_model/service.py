@@ -2,9 +2,11 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
+
+from msgspec.structs import replace
 
 from dodo_dsl.opendlv.assets.car import KIWI, read_car
 from services.base import Context, Flags, Handler, Output, Service, period_of

@@ -97,7 +97,7 @@ def found(row: Row, folder: Path, patch: pytest.MonkeyPatch) -> list[str]:
     """What ``dodo compile --check`` finds in the row's files, as rows have it."""
     write(row, folder)
     patch.chdir(folder)
-    code, out, err = run("compile", *row.paths, "--check", "--quiet", "--format", "json")
+    code, out, err = run("compile", *row.paths, "--check", "--format", "json")
     assert not err
     places: dict[str, str] = {}
     files: dict[str, str] = {}

@@ -48,4 +48,4 @@ def test_overlays_that_make_no_sense_are_told(write_map):
         (overlay("none.png"), r"overlay\[0\].textureFile: expected a regular file"),
     ):
         with pytest.raises(InputError, match=message):
-            load_scene(write_map({"overlay": [entry]}))
+            load_scene(write_map({"overlay": [entry]}, pictures={"t.png": np.zeros((4, 4, 3), np.uint8)}))
