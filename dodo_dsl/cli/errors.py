@@ -3,6 +3,8 @@
 Exit codes are the same for every command (design section 4); a higher one outranks a lower one.
 """
 
+import os
+import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from enum import IntEnum
@@ -57,8 +59,8 @@ def exit_code(error: Exception) -> Exit | None:
 
 def sentence(error: Exception) -> str:
     """The error's own text; an error of the system without its number, with its file."""
-    if _is_no_utf8(error):
-        return f"a name of a file or folder is not UTF-8: rename it ({error})"
+    if isinstance(error, UnicodeEncodeError) and _is_no_utf8(error):
+        return _of_no_utf8(error)
     if not isinstance(error, OSError):
         return str(error).rstrip("\n")
     place = f"{error.filename}: " if error.filename else ""
@@ -67,3 +69,11 @@ def sentence(error: Exception) -> str:
 
 def _is_no_utf8(error: Exception) -> bool:
     return isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed"
+
+
+def _of_no_utf8(error: UnicodeEncodeError) -> str:
+    """The text may be a whole file, of which the name is one value."""
+    begin = max(error.object.rfind(end, 0, error.start) for end in '"\n') + 1
+    name = re.split(r'["\n]', error.object[begin:], maxsplit=1)[0]
+    shown = os.fsencode(name).decode("utf-8", "backslashreplace")
+    return f"'{shown}' is not UTF-8, as names of files and folders must be here: rename it"

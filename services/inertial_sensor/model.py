@@ -1,109 +1,158 @@
 """What sensors on a moving body read: angular velocity, specific force, the magnetic field, and the place on earth.
 
-SI units. Body: x forward, y left, z up; world: z up. Vectors are (3,), rotations (3, 3).
+SI units. Body: x forward, y left, z up; world: z up. Vectors are tuples, and rotations matrices as three rows.
 """
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.envelope import MICROSECONDS
-from services.base import UnusableMessageError
 
-Array = NDArray[np.float64]
-_NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+UPRIGHT: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def attitude(qx: float, qy: float, qz: float, qw: float) -> Array:
-    """The rotation of a quaternion of any length from the body to the world; raises UnusableMessageError."""
+def turned(matrix: Matrix, v: Vector) -> Vector:
+    """The vector in the frame that the rotation turns it to."""
+    a, b, c = (sum(m * e for m, e in zip(row, v, strict=True)) for row in matrix)
+    return a, b, c
+
+
+def inverse(matrix: Matrix) -> Matrix:
+    """The rotation back."""
+    a, b, c = zip(*matrix, strict=True)
+    return a, b, c
+
+
+def attitude(qx: float, qy: float, qz: float, qw: float) -> Matrix | None:
+    """The rotation of a quaternion of any length from the body to the world; None for one that is none."""
     length = math.hypot(qx, qy, qz, qw)
     if not math.isfinite(length) or length == 0.0:
-        raise UnusableMessageError("it has no attitude")
+        return None
     x, y, z, w = (each / length for each in (qx, qy, qz, qw))
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
 
 
-class BodyState(NamedTuple):
+def mounted(roll: float, pitch: float, yaw: float) -> Matrix:
+    """The rotation from the sensor to the body, from angles in rad: yaw, then pitch, then roll about the new axes."""
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+
+
+def plus(*vectors: Vector) -> Vector:
+    """The sum."""
+    a, b, c = map(sum, zip(*vectors, strict=True))
+    return a, b, c
+
+
+def times(factor: float, v: Vector) -> Vector:
+    """The vector, so many times as long."""
+    return factor * v[0], factor * v[1], factor * v[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """The vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@dataclass(frozen=True)
+class BodyState:
     """Velocity (m/s) and angular velocity (rad/s) of a body along its axes, at a time in us."""
 
     time: int
-    velocity: Array
-    rates: Array
+    velocity: Vector = ZERO
+    rates: Vector = ZERO
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """As ``np.cross``, which takes ten times as long for one pair."""
-    product: Array = a[_NEXT] * b[_AFTER] - a[_AFTER] * b[_NEXT]
-    return product
+_UNKNOWN = BodyState(-1)
 
 
-def acceleration_of(before: BodyState, after: BodyState, lever: Array) -> Array:
+def acceleration_of(before: BodyState, after: BodyState, lever: Vector) -> Vector:
     """The mean acceleration along the body's axes (m/s2) of a point at ``lever`` (m), from one state to another.
 
     With v and ω at the middle of both: v' + ω x v + ω' x l + ω x (ω x l).
     """
     per_second = MICROSECONDS / (after.time - before.time)
-    velocity, rates = (before.velocity + after.velocity) / 2, (before.rates + after.rates) / 2
-    slower, turning = per_second * (after.velocity - before.velocity), per_second * (after.rates - before.rates)
-    around: Array = _cross(turning, lever) + _cross(rates, velocity + _cross(rates, lever))
-    return slower + around
+    velocity, rates = (times(0.5, plus(a, b)) for a, b in zip(_parts(before), _parts(after), strict=True))
+    slower, turning = (
+        times(per_second, plus(b, times(-1, a))) for a, b in zip(_parts(before), _parts(after), strict=True)
+    )
+    return plus(slower, cross(rates, velocity), cross(turning, lever), cross(rates, cross(rates, lever)))
+
+
+def _parts(state: BodyState) -> tuple[Vector, Vector]:
+    return state.velocity, state.rates
 
 
 class InertialModel:
     """A sensor at ``lever`` (m) on a body, turned by ``mount``; it knows the body from the states that it is fed."""
 
-    def __init__(self, lever: Array, mount: Array, gravity: float) -> None:
-        self._lever, self._to_sensor = lever, mount.T
-        self._upwards = np.array([0.0, 0.0, gravity])
-        self._newest: BodyState | None = None
-        self._used: BodyState | None = None
-        self._acceleration = np.zeros(3)
+    def __init__(self, lever: Vector = ZERO, mount: Matrix = UPRIGHT, gravity: float = 9.81) -> None:
+        self._lever, self._gravity = lever, gravity
+        self._to_sensor = inverse(mount)
+        self._newest = self._used = _UNKNOWN
+        self._acceleration = ZERO
 
     def feed(self, state: BodyState) -> None:
         """Take the body's state; one that is not newer than the last is ignored."""
-        if self._newest is None or state.time > self._newest.time:
+        if state.time > self._newest.time:
             self._newest = state
 
-    def motion(self, body: Array) -> tuple[Array, Array] | None:
-        """Angular velocity (rad/s) and specific force (m/s2) along the sensor's axes, with the body's attitude.
+    @property
+    def is_known(self) -> bool:
+        """Whether there was a state."""
+        return self._newest is not _UNKNOWN
 
-        The force is the mean since the state of the last reading. Before the second state the body's velocities are
-        held, and before the first there is no motion.
+    @property
+    def rates(self) -> Vector:
+        """The angular velocity in rad/s about the sensor's axes."""
+        return turned(self._to_sensor, self._newest.rates)
+
+    def force(self, body: Matrix) -> Vector:
+        """The specific force in m/s2 along the sensor's axes, with the body's attitude.
+
+        It is the mean since the state of the last reading. Before the second state the body's velocities are held.
         """
-        newest = self._newest
-        if newest is None:
-            return None
-        used = self._used or newest._replace(time=newest.time - 1)
+        newest, used = self._newest, self._used
+        if used is _UNKNOWN:
+            used = BodyState(newest.time - 1, newest.velocity, newest.rates)
         if newest.time > used.time:
             self._acceleration = acceleration_of(used, newest, self._lever)
         self._used = newest
-        return self._to_sensor @ newest.rates, self._to_sensor @ (self._acceleration + body.T @ self._upwards)
+        upwards = turned(inverse(body), (0.0, 0.0, self._gravity))
+        return turned(self._to_sensor, plus(self._acceleration, upwards))
 
-    def direction(self, body: Array, world: Array) -> Array:
+    def direction(self, body: Matrix, world: Vector) -> Vector:
         """A vector of the world along the sensor's axes."""
-        return np.asarray(self._to_sensor @ (body.T @ world), np.float64)
+        return turned(self._to_sensor, turned(inverse(body), world))
 
-    def place(self, body: Array, position: Array) -> Array:
+    def place(self, body: Matrix, position: Vector) -> Vector:
         """Where the sensor is in the world, in m."""
-        return np.asarray(position + body @ self._lever, np.float64)
+        return plus(position, turned(body, self._lever))
+
+    def heading(self, body: Matrix) -> float:
+        """Where the body looks, counter-clockwise from the world's x axis, in rad."""
+        return math.atan2(body[1][0], body[0][0])
 
 
-def magnetic_field(strength: float, inclination: float, declination: float, north: float) -> Array:
+def magnetic_field(strength: float, inclination: float, declination: float, north: float) -> Vector:
     """The earth's field in the world: so strong (T), so far below the horizon and east of north (rad).
 
     ``north`` is where north is, counter-clockwise from the world's x axis, in rad.
     """
     level, direction = strength * math.cos(inclination), north - declination
-    return np.array([level * math.cos(direction), level * math.sin(direction), -strength * math.sin(inclination)])
+    return level * math.cos(direction), level * math.sin(direction), -strength * math.sin(inclination)
 
 
 EQUATOR, FLATTENING = 6_378_137.0, 1 / 298.257223563
@@ -119,7 +168,7 @@ class Origin:
     altitude: float
     north: float
 
-    def geolocation(self, place: Array, east: float = 0.0, north: float = 0.0) -> tuple[float, float, float]:
+    def geolocation(self, place: Vector, east: float = 0.0, north: float = 0.0) -> tuple[float, float, float]:
         """Latitude and longitude in degrees, altitude in m, of a place in m that is measured so far (m) beside it.
 
         On the plane that touches the ellipsoid at the origin: one radius along the meridian, one along the parallel.

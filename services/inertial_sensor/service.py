@@ -5,11 +5,17 @@ import random
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
-from dodo_dsl.opendlv.attitude import quaternion
 from services.base import Context, Output, Service, UnusableMessageError, period_of
-from services.inertial_sensor.model import Array, BodyState, InertialModel, Origin, attitude, magnetic_field
+from services.inertial_sensor.model import (
+    BodyState,
+    InertialModel,
+    Matrix,
+    Origin,
+    Vector,
+    attitude,
+    magnetic_field,
+    mounted,
+)
 
 _ANGULAR, _ACCELERATION = "opendlv.proxy.AngularVelocityReading", "opendlv.proxy.AccelerationReading"
 _MAGNETIC, _PLACE = "opendlv.proxy.MagneticFieldReading", "opendlv.logic.sensation.Geolocation"
@@ -23,65 +29,63 @@ class InertialSensor(Service):
         self._flags = flags
         self._type = context.messages.type
         self.period = period_of(flags["freq"])
-        mount = attitude(*quaternion(*(math.radians(flags[name]) for name in ("roll", "pitch", "yaw"))))
-        self._model = InertialModel(np.array([flags["x"], flags["y"], flags["z"]]), mount, flags["gravity"])
+        mount = mounted(*(math.radians(flags[name]) for name in ("roll", "pitch", "yaw")))
+        self._model = InertialModel((flags["x"], flags["y"], flags["z"]), mount, flags["gravity"])
         self._sent = [flags[name] for name in ("angular-velocity", "acceleration", "magnetic-field")]
         north = math.radians(flags["north"])
         self._origin = Origin(flags["latitude"], flags["longitude"], flags["altitude"], north)
         inclination, declination = (math.radians(flags[name]) for name in ("inclination", "declination"))
         self._field = magnetic_field(flags["field"], inclination, declination, north)
-        self._pose: tuple[Array, Array] | None = None
+        self._pose: tuple[Matrix, Vector] | None = None
         self.inputs = {
             ("opendlv.sim.Frame", flags["frame-id"]): self._take_frame,
             ("opendlv.sim.KinematicState", flags["frame-id"]): self._take_state,
         }
 
     def update(self, now: int) -> list[Output]:
-        motion = self._model.motion(self._pose[0]) if self._pose else None
-        if self._pose is None or motion is None:
+        if self._pose is None or not self._model.is_known:
             return []
-        return [Output(message, self._flags["sender"]) for message in self._readings(*self._pose, *motion, now)]
+        return [Output(message, self._flags["sender"]) for message in self._readings(*self._pose, now)]
 
-    def _readings(self, body: Array, position: Array, rates: Array, force: Array, now: int) -> Iterator[Any]:
+    def _readings(self, body: Matrix, position: Vector, now: int) -> Iterator[Any]:
         """Those that are sent; the noise of each does not depend on the others."""
-        flags = self._flags
+        flags, model = self._flags, self._model
         chance = random.Random(flags["seed"] << 64 | now)  # noqa: S311
-        bias, noise = (math.radians(flags[name]) for name in ("gyro-bias", "gyro-noise"))
         vectors = (
-            (_ANGULAR, "angularVelocity", rates, bias, noise),
-            (_ACCELERATION, "acceleration", force, flags["acceleration-bias"], flags["acceleration-noise"]),
             (
-                _MAGNETIC,
-                "magneticField",
-                self._model.direction(body, self._field),
-                flags["field-bias"],
-                flags["field-noise"],
+                _ANGULAR,
+                "angularVelocity",
+                model.rates,
+                math.radians(flags["gyro-bias"]),
+                math.radians(flags["gyro-noise"]),
             ),
+            (_ACCELERATION, "acceleration", model.force(body), flags["acceleration-bias"], flags["acceleration-noise"]),
+            (_MAGNETIC, "magneticField", model.direction(body, self._field), flags["field-bias"], flags["field-noise"]),
         )
         for (name, field, value, bias, noise), is_sent in zip(vectors, self._sent, strict=True):
-            measured = [each + bias + chance.gauss(0.0, noise) for each in value.tolist()]
+            measured = [each + bias + chance.gauss(0.0, noise) for each in value]
             if is_sent:
                 yield self._type(name)(**{f"{field}{axis}": each for axis, each in zip("XYZ", measured, strict=True)})
         if flags["geolocation"]:
             yield self._place(body, position, chance)
 
-    def _place(self, body: Array, position: Array, chance: random.Random) -> Any:
+    def _place(self, body: Matrix, position: Vector, chance: random.Random) -> Any:
+        x, y, z = self._model.place(body, position)
         east, north, up = (chance.gauss(0.0, self._flags["position-noise"]) for _ in range(3))
-        place = self._model.place(body, position) + np.array([0.0, 0.0, up])
-        latitude, longitude, altitude = self._origin.geolocation(place, east, north)
-        angle = math.atan2(body[1, 0], body[0, 0]) + chance.gauss(0.0, math.radians(self._flags["heading-noise"]))
+        latitude, longitude, altitude = self._origin.geolocation((x, y, z + up), east, north)
+        angle = self._model.heading(body) + chance.gauss(0.0, math.radians(self._flags["heading-noise"]))
         heading = self._origin.heading(angle)
         return self._type(_PLACE)(latitude=latitude, longitude=longitude, altitude=altitude, heading=heading)
 
     def _take_frame(self, frame: Any, _sample_time: int) -> None:
-        if not math.isfinite(frame.x + frame.y + frame.z):
-            raise UnusableMessageError("it has no position")
-        self._pose = attitude(frame.qx, frame.qy, frame.qz, frame.qw), np.array([frame.x, frame.y, frame.z])
+        body = attitude(frame.qx, frame.qy, frame.qz, frame.qw)
+        if body is None or not math.isfinite(frame.x + frame.y + frame.z):
+            raise UnusableMessageError("it has no position or no attitude")
+        self._pose = body, (frame.x, frame.y, frame.z)
 
     def _take_state(self, state: Any, sample_time: int) -> None:
-        velocity = np.array([state.vx, state.vy, state.vz])
-        rates = np.array([state.rollRate, state.pitchRate, state.yawRate])
-        if not np.isfinite([velocity, rates]).all():
+        velocity, rates = (state.vx, state.vy, state.vz), (state.rollRate, state.pitchRate, state.yawRate)
+        if not all(map(math.isfinite, (*velocity, *rates))):
             raise UnusableMessageError("it is not finite")
         self._model.feed(BodyState(sample_time, velocity, rates))
 

@@ -155,39 +155,3 @@ def test_mappings_of_pages_fit_the_schema(page: str) -> None:
     assert mappings
     for mapping in mappings:
         schema.validate({"services": {"node": {"image": "node", "x-dodo": {"ros": mapping}}}})
-
-
-RCLCPP = """
-#include <functional>
-#include <memory>
-#include <string>
-namespace rclcpp {
-struct SensorDataQoS {};
-template <typename M> struct Publisher { using SharedPtr = std::shared_ptr<Publisher>; void publish(const M &) {} };
-template <typename M> struct Subscription { using SharedPtr = std::shared_ptr<Subscription>; };
-struct Node {
-    explicit Node(const std::string &) {}
-    template <typename M> typename Publisher<M>::SharedPtr create_publisher(const std::string &, int) { return {}; }
-    template <typename M> typename Subscription<M>::SharedPtr create_subscription(
-        const std::string &, SensorDataQoS, std::function<void(typename M::ConstSharedPtr)>) { return {}; }
-};
-inline void init(int, char **) {}
-inline void spin(std::shared_ptr<Node>) {}
-inline void shutdown() {}
-}
-"""
-
-
-@needs_ros
-@pytest.mark.thorough
-def test_the_new_application_in_cpp_is_sound(tmp_path: Path) -> None:
-    """As far as can be seen where rclcpp is not: with the real messages, and its names alone."""
-    written = dodo(tmp_path, "new", "--application", "--ros", "--language", "cpp")
-    assert "colcon build" in written
-    (tmp_path / "stand-in/rclcpp").mkdir(parents=True)
-    (tmp_path / "stand-in/rclcpp/rclcpp.hpp").write_text(RCLCPP)
-    headers = [tmp_path / "stand-in", *(PYTHON.parents[1] / "include").iterdir()]
-    flags = ["-std=c++17", "-Wall", "-Wextra", "-Werror", *(f"-I{path}" for path in headers)]
-    command = ["g++", "-fsyntax-only", *flags, "steering.cpp"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr

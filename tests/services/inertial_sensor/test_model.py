@@ -7,61 +7,62 @@ import pytest
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.attitude import quaternion
-from services.base import UnusableMessageError
 from services.dynamic_model.drives import SPEED, BicycleDrive, SingleTrack
 from services.dynamic_model.model import STEERING, Vehicle
-from services.inertial_sensor.model import Array, BodyState, InertialModel, Origin, attitude, magnetic_field
+from services.inertial_sensor.model import (
+    UPRIGHT,
+    BodyState,
+    InertialModel,
+    Origin,
+    Vector,
+    attitude,
+    inverse,
+    magnetic_field,
+    mounted,
+    turned,
+)
 from services.integrator.model import BodyPose, Integrator, Twist, angles
 
 G = 9.81
 
 
-def mounted(roll: float, pitch: float, yaw: float) -> Array:
-    return attitude(*quaternion(roll, pitch, yaw))
-
-
-def model_of(lever: tuple[float, float, float] = (0, 0, 0), mount: Array | None = None) -> InertialModel:
-    return InertialModel(np.array(lever), np.eye(3) if mount is None else mount, G)
-
-
-def state(number: int, vx: float = 0.0, yaw_rate: float = 0.0, vy: float = 0.0) -> BodyState:
-    return BodyState(number, np.array([vx, vy, 0.0]), np.array([0.0, 0.0, yaw_rate]))
+def upright(yaw: float) -> tuple[Vector, Vector, Vector]:
+    matrix = attitude(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+    assert matrix is not None
+    return matrix
 
 
 def test_a_sensor_at_rest_reads_gravity_upwards_and_one_on_its_side_along_its_axis() -> None:
     for mount, expected in (
-        (mounted(0, 0, 0), (0.0, 0.0, G)),
+        (UPRIGHT, (0.0, 0.0, G)),
         (mounted(math.pi / 2, 0.0, 0.0), (0.0, G, 0.0)),
         (mounted(0.0, math.pi / 2, 0.0), (-G, 0.0, 0.0)),
         (mounted(0.0, 0.0, 1.0), (0.0, 0.0, G)),
     ):
-        model = model_of(mount=mount)
-        assert model.motion(mounted(0, 0, 2.0)) is None
-        model.feed(state(0))
-        assert model.motion(mounted(0, 0, 2.0))[1] == pytest.approx(expected, abs=1e-12)
+        model = InertialModel(mount=mount)
+        model.feed(BodyState(0))
+        assert model.force(upright(2.0)) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("lever", [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, -0.2, 0.4)])
-def test_on_a_circle_it_reads_the_acceleration_to_the_centre(lever: tuple[float, float, float]) -> None:
+def test_on_a_circle_it_reads_the_acceleration_to_the_centre(lever: Vector) -> None:
     speed, rate = 2.0, 0.5
-    model = model_of(lever)
+    model = InertialModel(lever)
     for number in range(3):
-        model.feed(state(number * 10_000, speed, rate))
-        rates, force = model.motion(mounted(0, 0, rate * number / 100))
+        model.feed(BodyState(number * 10_000, (speed, 0.0, 0.0), (0.0, 0.0, rate)))
+        force = model.force(upright(rate * number / 100))
         assert force == pytest.approx((-(rate**2) * lever[0], speed * rate - rate**2 * lever[1], G))
-        assert rates.tolist() == [0.0, 0.0, rate]
+    assert model.rates == (0.0, 0.0, rate)
 
 
 def test_the_readings_are_the_derivative_of_a_drive() -> None:
     """A car that steers and brakes, at 1 kHz, and the sensor's place differentiated twice."""
-    vehicle, body = (
-        Vehicle(BicycleDrive(SingleTrack(2.7, 1.2, 1.0, 0.6, 0.5, 0.5, 4.0, 8.0, 50.0))),
-        Integrator(BodyPose((0, 0, 0), quaternion(0, 0, 0.7))),
-    )
+    car = SingleTrack(2.7, 1.2, 1.0, 0.6, 0.5, 0.5, 4.0, 8.0, 50.0)
+    vehicle, body = Vehicle(BicycleDrive(car)), Integrator(BodyPose((0, 0, 0), quaternion(0, 0, 0.7)))
     lever, mount = (0.8, 0.3, 0.5), mounted(0.1, -0.2, 0.3)
-    model = model_of(lever, mount)
+    model = InertialModel(lever, mount)
     places: list[NDArray[np.float64]] = []
-    read: list[NDArray[np.float64]] = []
+    read: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
     rates: list[tuple[float, float]] = []
     for number in range(6001):
         now = number * 1000
@@ -71,14 +72,15 @@ def test_the_readings_are_the_derivative_of_a_drive() -> None:
         body.feed(Twist((motion.vx, motion.vy, 0.0), (0.0, 0.0, motion.yaw_rate)), now)
         pose = body.update(now)
         matrix = attitude(*pose.attitude)
-        model.feed(state(now, motion.vx, motion.yaw_rate, motion.vy))
+        assert matrix is not None
+        model.feed(BodyState(now, (motion.vx, motion.vy, 0.0), (0.0, 0.0, motion.yaw_rate)))
         if number % 10 == 0:
-            places.append(model.place(matrix, np.array(pose.position)))
-            turning, force = model.motion(matrix)
-            read.append(matrix @ mount @ force)
-            rates.append(((mount @ turning)[2], angles(pose.attitude)[2]))
+            places.append(np.array(model.place(matrix, pose.position)))
+            force = np.array(turned(matrix, turned(mount, model.force(matrix))))
+            read.append((force, np.array(matrix)))
+            rates.append((turned(mount, model.rates)[2], angles(pose.attitude)[2]))
     second = np.gradient(np.gradient(np.array(places), 0.01, axis=0), 0.01, axis=0)
-    forces = np.array(read) - [0.0, 0.0, G]
+    forces = np.array([force for force, _ in read]) - [0.0, 0.0, G]
     assert np.abs(second[5:-5]).max() > 3.0
     middle = (forces[5:-5] + forces[6:-4]) / 2  # a reading is the mean of the time before it
     assert np.abs(middle - second[5:-5]).mean() < 0.02
@@ -91,14 +93,15 @@ def test_the_compass_turns_with_the_body_and_the_sensor() -> None:
     assert math.hypot(*field) == pytest.approx(5e-5) and field[2] == pytest.approx(-5e-5 * math.sin(math.radians(60)))
     assert math.degrees(math.atan2(field[1], field[0])) == pytest.approx(80)  # east of north, which is y
     for yaw in (0.0, 0.7, 3.0):
-        seen = model_of(mount=mounted(0, 0, 0.2)).direction(mounted(0, 0, yaw), field)
+        seen = InertialModel(mount=mounted(0, 0, 0.2)).direction(upright(yaw), field)
         assert math.atan2(seen[1], seen[0]) == pytest.approx(math.remainder(math.radians(80) - yaw - 0.2, math.tau))
 
 
-@pytest.mark.parametrize("q", [(0, 0, 0, 0), (0, 0, math.nan, 1)])
-def test_what_has_no_attitude(q: tuple[float, float, float, float]) -> None:
-    with pytest.raises(UnusableMessageError):
-        attitude(*q)
+def test_a_mount_is_as_the_integrator_turns() -> None:
+    q = quaternion(0.3, -0.4, 1.1)
+    assert np.array(mounted(0.3, -0.4, 1.1)) == pytest.approx(np.array(attitude(*q)))
+    assert np.array(inverse(mounted(0.3, -0.4, 1.1))) @ np.array(mounted(0.3, -0.4, 1.1)) == pytest.approx(np.eye(3))
+    assert attitude(0, 0, 0, 0) is None and attitude(0, 0, math.nan, 1) is None
 
 
 @pytest.mark.parametrize(

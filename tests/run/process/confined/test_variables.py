@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.run.helpers import PASS, READY, Bench
+from tests.run.helpers import AFTER_START, PASS, READY, STARTED, Bench
 
-TELLS = "import json; print(json.dumps(dict(os.environ)), flush=True); time.sleep(60)"
+TELLS = "import json; print(json.dumps(dict(os.environ)), flush=True)"
 
 
 @pytest.mark.slow
@@ -22,7 +22,7 @@ def test_the_programs_of_the_sandbox_do_not_get_them(tmp_path: Path, isolation: 
     for name in ("bwrap", "python", "python3"):
         (traps / name).write_text(f"#!/bin/sh\ntouch {traps}/sprung\n")
         (traps / name).chmod(0o755)
-    plan = bench.plan(judge=READY + "time.sleep(0.5)\n" + PASS, application=TELLS)
+    plan = bench.plan(judge=READY + AFTER_START + PASS, application=f"{TELLS}\n{STARTED}time.sleep(60)")
     (app,) = plan.application.services
     given = {"LD_PRELOAD": "/nowhere/evil.so", "LD_AUDIT": "/nowhere/audit.so", "PATH": f"{traps}:/usr/bin", "A": "b"}
     service = replace(app, process=(sys.executable, *app.process[1:]), environment=given)
