@@ -53,11 +53,15 @@ def test_errors_of_the_machine(kind: type[Exception], monkeypatch: pytest.Monkey
     assert ended(kind("it is so"), monkeypatch, "doctor") == (3, "dodo doctor: it is so\n")
 
 
-def test_a_name_that_is_not_utf8_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("text", ["caf\udce9/x", 'of: "caf\udce9/x"\nmore: "y"'])
+def test_a_name_that_is_not_utf8_is_named(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(UnicodeEncodeError) as raised:
-        json_text({"path": "caf\udce9/x"})
-    code, said = ended(raised.value, monkeypatch)
-    assert (code, said.startswith("dodo list: a name of a file or folder is not UTF-8: rename it ")) == (2, True)
+        json_text({"path": text})
+    said = "dodo list: 'caf\\xe9/x' is not UTF-8, as names of files and folders must be here: rename it\n"
+    assert ended(raised.value, monkeypatch)[0] == 2
+    with pytest.raises(UnicodeEncodeError) as raised:
+        text.encode()
+    assert ended(raised.value, monkeypatch) == (2, said)
 
 
 def test_a_rig_says_whose_error_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
