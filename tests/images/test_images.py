@@ -123,7 +123,8 @@ def starts_with_all_it_needs(image: str, manifest: Manifest) -> None:
     files = ("--volume", f"{ROOT / 'tests_registry'}:/opt/dodo/tests_registry:ro")
     words = (manifest.name, "--cid=131", *about["example"])
     with own_volume() as volume, started(image, volume, *words, flags=files) as container:
-        assert await_health(container) == "healthy"
+        found = await_health(container)  # a short drive may be over before the engine has looked
+        assert found == "healthy" or found.startswith('exited: {"dodo": "ready"}'), found
 
 
 @each_service
