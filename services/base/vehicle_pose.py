@@ -1,4 +1,4 @@
-"""Where a vehicle is in the plane, by its frame."""
+"""Where a vehicle is in the plane, by its frame: apart from the rest of the base, as it loads what geometry needs."""
 
 import math
 from typing import Any

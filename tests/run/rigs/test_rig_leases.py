@@ -97,7 +97,7 @@ def test_no_variable_moves_that_of_hardware(tmp_path: Path, monkeypatch: pytest.
     """The machine's own device may be any but one of software; here the account's folder is another one."""
     device = next((str(p) for p in Path("/dev").iterdir() if rig_leases.is_hardware_device(str(p))), "")
     if not device:
-        pytest.skip("there is no device of hardware in /dev")
+        pytest.skip("no hardware device in /dev")
     monkeypatch.setattr(rig_leases, "shared_path", lambda _: None)
     monkeypatch.setattr(rig_leases, "account_path", lambda name: tmp_path / "account" / name)
     (tmp_path / "account").mkdir()

@@ -17,7 +17,7 @@ INPUTS = (STEERING, 0), (STEERING, 9), ("opendlv.proxy.PedalPositionRequest", No
 
 
 def strangers(cid: int, *those: tuple[int, int]) -> list[str]:
-    """What is told of messages that came, by id and stamp."""
+    """What the loop reports of messages that came, by id and stamp."""
     service = Service()
     service.inputs = dict.fromkeys(INPUTS, lambda *_: None)
     with Session(cid) as session:
