@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.run.process import process_group
 from dodo_dsl.run.work_folder import meeting_place
+from dodo_dsl.spec.model import ResourceLimits
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from tests.run.desk import gone, processes_with
 from tests.run.helpers import AFTER_START, PASS, READY, STARTED, WAIT, Bench
@@ -21,6 +23,22 @@ if os.fork() == 0:
     os._exit(0)
 os.wait()
 """
+
+
+HIDES = """
+import os, signal, time
+signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+for number in range(75):
+    if os.fork() == 0:
+        while time.process_time() < 0.02: pass
+        os._exit(0)
+    time.sleep(0.01)
+try:
+    os.wait()
+except ChildProcessError:
+    pass
+"""
+"""1.5 s of processor time in children for which nobody waits, so that it is added to nobody's."""
 
 
 @pytest.fixture
@@ -76,3 +94,15 @@ def test_what_it_writes_goes_with_the_test(bench: Bench) -> None:
     assert outcome.outcome == "passed"
     assert own.read_text() == "as it was"
     assert not Path(f"{own}.new").exists()
+
+
+def test_children_for_which_nobody_waits_are_in_the_account(bench: Bench) -> None:
+    """The bound is wide: what was used before the test began does not count."""
+    if (group := process_group.make(200)) is None:
+        pytest.skip("this user may make no control group")
+    group.remove()
+    plan = bench.plan(judge=READY + AFTER_START + PASS, application=f"time.sleep(0.7)\n{HIDES}{STARTED}{WAIT}")
+    (outcome,) = bench.run(replace(plan, resources=ResourceLimits(max_processor_time_s=0.6)))
+    (use,) = outcome.resources
+    assert use.processor_s > 0.6
+    assert outcome.outcome == "failed" and outcome.reason.endswith(" s of processor time, at most 0.6 s")

@@ -13,14 +13,16 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn
 
 from dodo_dsl.run.machine_load.processes import above, living, owners
+from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.process import confined_process, namespaces
 from dodo_dsl.run.process.confinement import Confinement
 from dodo_dsl.run.process.places import Places
+from dodo_dsl.run.process.process_group import ProcessGroup
 
 GRACE_S = 3.0
 _POLL_S = 0.05
@@ -88,6 +90,7 @@ class _Child:
     """Bytes that it may use at most, 0 for no limit."""
     used: int = 0
     """Bytes for which it was ended."""
+    group: ProcessGroup | None = None
 
 
 class Children:
@@ -106,6 +109,8 @@ class Children:
         """All that were ever started, by process id."""
         self.application: dict[int, str] = {}
         """The application's among them."""
+        self._took_s: dict[str, float] = {}
+        """Processor time of the application's programs that ended, by their groups."""
 
     def fork(self, name: str, words: Sequence[str], environment: dict[str, str], folder: str, output: int) -> int:
         """Forks this process for a Python module, and gives the process id; raises OSError."""
@@ -147,14 +152,26 @@ class Children:
         places: Places | None,
     ) -> int:
         """Starts a program of the application; raises as ``start``, and NoSeccomp."""
-        process, status = confined_process.start(words, environment, output, confined, places, self._umask)
+        process, status, group = confined_process.start(words, environment, output, confined, places, self._umask)
         self.application[process.pid] = name
-        return self._add(process.pid, _Child(name, process, status, confined.limits.memory))
+        return self._add(process.pid, _Child(name, process, status, confined.limits.memory, group=group))
 
     def _add(self, pid: int, child: _Child) -> int:
         self._running[pid] = child
         self.names[pid] = child.name
         return pid
+
+    def with_counted(self, taken: Snapshot) -> Snapshot:
+        """What services used, with processes that ended before they were seen, where control groups count them."""
+        took_s = dict(self._took_s)
+        for child in self._running.values():
+            if child.group:
+                took_s[child.name] = child.group.used_s() or 0.0
+        services = {
+            name: used._replace(processor_s=max(used.processor_s, took_s.get(name, 0.0)))
+            for name, used in taken.services.items()
+        }
+        return replace(taken, services=services)
 
     def watch_memory(self) -> None:
         """Ends those that use more memory than they may."""
@@ -173,6 +190,9 @@ class Children:
                     code, failed = os.waitstatus_to_exitcode(ended[1]), False
                     if child.process:
                         child.process.returncode = code  # so that nobody waits for it again
+                    if child.group:
+                        self._took_s[child.name] = child.group.used_s() or 0.0
+                        child.group.remove()
                     if child.status >= 0:
                         code, failed = confined_process.ended(child.status, code)
                     self._on_exit(child.name, code, child.used, failed)

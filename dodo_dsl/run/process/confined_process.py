@@ -10,13 +10,12 @@ import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from dodo_dsl.run.process import confinement, namespaces, seccomp_filter
+from dodo_dsl.run.process import confinement, namespaces, process_group, seccomp_filter
 from dodo_dsl.run.process.confinement import PROGRAM, Confinement
 from dodo_dsl.run.process.places import Places
+from dodo_dsl.run.process.process_group import ProcessGroup
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
-_OURS = 2
-"""Processes of a service's sandbox that are not the application's: bubblewrap, and the first of its namespace."""
 _SIGNALLED = range(129, 129 + 64)
 """Exit codes by which bubblewrap reports the signal that ended the program."""
 _BEGAN = b'"exit-code"'
@@ -30,8 +29,8 @@ def start(
     confined: Confinement,
     places: Places | None,
     umask: int = -1,
-) -> tuple[subprocess.Popen[bytes], int]:
-    """Bubblewrap's process, which ends with the program and gives its exit code, and a descriptor for ``ended``.
+) -> tuple[subprocess.Popen[bytes], int, ProcessGroup | None]:
+    """Bubblewrap's process, which ends with the program and gives its exit code, a descriptor for ``ended``, its group.
 
     ``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp.
     """
@@ -41,6 +40,7 @@ def start(
     others = 0 if user is not None else _threads_of_this_user()
     sandbox = confinement.sandbox_words(confined, places, program, given)
     filtered = {"--seccomp": seccomp_filter.program()} if places else {}
+    group = process_group.make(confined.limits.processes)
     said, status = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     try:
         with _in_files(filtered) as passed, os.fdopen(status, "wb"):
@@ -62,12 +62,14 @@ def start(
                     group=user,
                     extra_groups=None if user is None else [],
                     pass_fds=(*passed.values(), *files.values()),
-                    preexec_fn=functools.partial(_limit, confined.limits, os.getpid(), others),  # noqa: PLW1509
+                    preexec_fn=functools.partial(_limit, confined.limits, os.getpid(), group, others),  # noqa: PLW1509
                 )
     except BaseException:
         os.close(said)
+        if group:
+            group.remove()
         raise
-    return process, said
+    return process, said, group
 
 
 def ended(said: int, code: int) -> tuple[int, bool]:
@@ -98,11 +100,12 @@ def _found(name: str, environment: Mapping[str, str], folder: str) -> str:
     return str(Path(folder, found))
 
 
-def _limit(limits: SandboxLimits, parent: int, others: int) -> None:
-    """Between fork and exec. The kernel counts processes by user, ``others`` of this one among them."""
+def _limit(limits: SandboxLimits, parent: int, group: ProcessGroup | None, others: int) -> None:
+    """Between fork and exec. Without a group the kernel counts processes by user, ``others`` of this one among them."""
     namespaces.end_with(parent)
+    if group is None or not group.join():
+        _set_limit(resource.RLIMIT_NPROC, limits.processes + process_group.OURS + 2 * others)
     for kind, most in (
-        (resource.RLIMIT_NPROC, limits.processes + _OURS + 2 * others),
         (resource.RLIMIT_CORE, 0),
         (resource.RLIMIT_NOFILE, limits.files),
         (resource.RLIMIT_FSIZE, limits.file_size),

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 from dodo_dsl.run import application_time, leases
+from dodo_dsl.run.process import process_group
 from dodo_dsl.run.process.slot import SLOT_VARIABLE
 
 SLOT_NAME = re.compile(r"dodo-[0-9a-f]{8}-")
@@ -19,6 +20,7 @@ _END_S, _KILL_S = 3.0, 2.0
 def reap() -> list[str]:
     """Removes what killed runs left on the host, by leases that nobody holds; returns a phrase for each test."""
     removed = []
+    process_group.remove_unused()
     for lease in leases.orphans(leases.CID):
         killed, memories = remove_left(lease)
         if killed or memories:

@@ -166,7 +166,7 @@ class Sandbox:
         """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""
         self.use.sized.update(names)
         taken = self.use.take({**self.children.names, os.getpid(): ""}) if _has_own_proc() else None
-        self.send(use=taken and asdict(taken))
+        self.send(use=taken and asdict(self.children.with_counted(taken)))
 
     def _do_listeners(self, _descriptors: list[int]) -> None:
         found = listening(self.children.application) if _has_own_proc() else None

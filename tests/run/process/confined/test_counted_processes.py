@@ -1,13 +1,21 @@
-"""An application's limit of processes, which the kernel counts by its own user id, and programs that never begin."""
+"""What counts the processes of an application: an own user id, and control groups where there are some."""
 
+import os
+import subprocess
+import sys
+import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from dodo_dsl.run.process import process_group
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
-from tests.run.helpers import READY, WAIT, Bench
+from tests.run.desk import ROOT
+from tests.run.helpers import PASS, READY, WAIT, Bench
 
+as_root = pytest.mark.skipif(os.getuid() != 0, reason="who is no root has one user id")
 THREADS = """
 import threading
 for _ in range(20):
@@ -31,6 +39,16 @@ def test_the_tests_own_limit_holds(tmp_path: Path, processes: int) -> None:
         assert outcome.reason.startswith("service 'app' could not be started: its sandbox cannot be set up: bwrap: ")
 
 
+@as_root
+@pytest.mark.proof
+def test_the_limit_holds_without_control_groups() -> None:
+    """The kernel then counts by user."""
+    hidden = ["bwrap", "--dev-bind", "/", "/", "--tmpfs", "/sys/fs/cgroup", "--cap-add", "ALL"]
+    test = [sys.executable, "-m", "pytest", "-q", f"{__file__}::test_the_tests_own_limit_holds"]
+    done = subprocess.run([*hidden, *test], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 0, done.stdout
+
+
 @pytest.mark.slow
 def test_a_program_that_cannot_be_executed_is_an_error(tmp_path: Path) -> None:
     bench = Bench(tmp_path)
@@ -43,3 +61,22 @@ def test_a_program_that_cannot_be_executed_is_an_error(tmp_path: Path) -> None:
     (outcome,) = bench.run(replace(plan, application=replace(plan.application, services=apps)))
     reason = f"service 'app' could not be started: {program}: No such file or directory"
     assert (outcome.outcome, outcome.reason) == ("error", reason)
+
+
+def is_empty(group: Path) -> bool:
+    with suppress(OSError):
+        return not (group / "cgroup.procs").read_text()
+    return False
+
+
+@as_root
+@pytest.mark.slow
+def test_no_group_is_left_behind(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    before = {folder for parent in process_group._parents(Path("/proc/self")) for folder in parent.glob("dodo-*")}
+    bench.run(bench.plan(judge=READY + PASS))
+    left = {folder for parent in process_group._parents(Path("/proc/self")) for folder in parent.glob("dodo-*")}
+    until = time.monotonic() + 10
+    while (empty := {folder for folder in left - before if is_empty(folder)}) and time.monotonic() < until:
+        time.sleep(0.1)  # another test's is not filled or removed yet
+    assert not empty
