@@ -39,7 +39,9 @@ def load(file: Path) -> Any:
 @functools.lru_cache(maxsize=2)
 def _document(file: Path, data: bytes) -> Any:
     try:
-        return msgspec.json.decode(data.decode("utf-8-sig"))
+        text = data.decode("utf-8-sig")
+        value = msgspec.json.decode(text)
+        place = next(_repeated(text), "")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise InputError(file, f"byte {error.start} is not UTF-8 text", line=line) from None
@@ -53,6 +55,35 @@ def _document(file: Path, data: bytes) -> Any:
         before = data.removeprefix(b"\xef\xbb\xbf")[: int(at) if at else None].decode(errors="replace")
         line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
         raise InputError(file, f"not JSON: {what[:1].lower()}{what[1:]}", line=line, column=column) from None
+    if place:
+        what = f"the key '{place.rpartition('.')[2]}' appears twice in one object"
+        raise InputError(file, what, place, hint="keep one of them: only the last would count")
+    return value
+
+
+def _repeated(text: str) -> Iterator[str]:
+    """The paths of keys that stand twice in their objects, which are lost when JSON becomes a dict."""
+    is_doubtful = False
+
+    def once(pairs: list[tuple[str, object]]) -> tuple[tuple[str, object], ...]:
+        nonlocal is_doubtful
+        is_doubtful |= len(dict(pairs)) < len(pairs)
+        return tuple(pairs)
+
+    document = json.loads(text, object_pairs_hook=once, parse_int=str, parse_float=str)
+    if is_doubtful:
+        yield from _repeated_in(document, "$")
+
+
+def _repeated_in(value: object, place: str) -> Iterator[str]:
+    names = set[object]()
+    for name, inner in value if isinstance(value, tuple) else ():
+        if name in names:
+            yield f"{place}.{name}"
+        names.add(name)
+        yield from _repeated_in(inner, f"{place}.{name}")
+    for number, inner in enumerate(value if isinstance(value, list) else ()):
+        yield from _repeated_in(inner, f"{place}[{number}]")
 
 
 def converted(

@@ -17,6 +17,8 @@ SLIPS = [
     ("[NaN]", "1:2: not JSON: invalid character"),
     ("[1]]", "1:5: not JSON: trailing characters"),
     (" \n", "2:1: not JSON: input data was truncated"),
+    ('[{"b": {"a": 1}}, {"a": {}, "a": 2}]', "$[1].a: the key 'a' appears twice in one object"),
+    ('[{"a": {"b": 1, "b": 2}}]', "$[0].a.b: the key 'b' appears twice in one object"),
     ("[1e999]", "$[0]: Number out of range"),
 ]
 
