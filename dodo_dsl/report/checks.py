@@ -1,7 +1,7 @@
 """A check in words and as a bar: its value, its limits, what it means, and which check of a test is shown first."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from markupsafe import Markup
@@ -132,23 +132,23 @@ MEANINGS = {
     "answered": "frames that the application answered",
     "ate": "root mean square of the distances between estimates and true positions",
     "body-margin": "smallest distance between the vehicle and another body",
-    "broken": "samples or answers that are not finite numbers",
+    "broken": "samples that are not finite numbers",
     "coverage": "share of the time with a target that samples cover",
     "covered": "share of the area that the vehicle covered",
     "delay": "longest time between a frame and its answer",
-    "distance": "distance that the vehicle drove, or largest distance of a sample from the target",
+    "distance": "distance that the vehicle drove",
     "error": "largest distance of an estimate from the true position",
     "estimates": "estimates of the pose that were judged",
     "f1": "precision and recall in one number: their harmonic mean",
     "false-negatives": "true boxes that no detection matches",
     "false-positives": "detections that match no true box",
     "frame-share": "share of the frames whose sample is within the band around the target",
-    "frames": "frames that were judged, or answered in time",
+    "frames": "frames that were judged",
     "gap": "longest time without a sample or an answer",
     "gates": "gates that the vehicle crossed in their order",
     "highest": "largest value that was sent",
     "lag": "how late the signal follows its target",
-    "late": "samples, detections or answers that came too late to count",
+    "late": "samples or detections that came too late to be judged, ignored",
     "lowest": "smallest value that was sent",
     "max-speed": "highest speed of the vehicle",
     "mean": "mean distance of the samples from the target",
@@ -164,7 +164,7 @@ MEANINGS = {
     "rpe": "root mean square of the errors of motion from pose to pose",
     "rpe-rotation": "root mean square of the errors of turns from pose to pose",
     "samples": "samples that were judged",
-    "share": "share of the time within the band around the target, or of the frames answered in time",
+    "share": "share of the time within the band around the target",
     "sign-share": "share of the frames whose sample has the sign of the target",
     "silence": "longest time between two requests of the application",
     "std": "population standard deviation of the distance from the target",
@@ -184,13 +184,24 @@ MEANINGS = {
     SLOW_ANSWERS: "share of the answers that took longer than the test allows",
 }
 """By the names of checks, as the READMEs of the evaluators define them."""
+_BESIDE = {
+    "distance": ("mean", "largest distance of a sample from the target"),
+    "broken": ("delay", "answers that are not finite numbers"),
+    "frames": ("delay", "frames that were answered in time"),
+    "late": ("delay", "answers that came too late to count"),
+    "share": ("delay", "share of the frames that were answered in time"),
+}
+"""What the same names mean beside another check."""
 _PREFIXES = (PEAK_MEMORY, PROCESSOR_TIME, PROCESSOR_SHARE, "precision", "recall", "f1")
 """Of checks of each service, or of each class."""
 
 
-def meaning(check: Check) -> str:
-    """What a check measures, in a few words; empty where unknown."""
+def meaning(check: Check, others: Collection[str] = ()) -> str:
+    """What a check measures, in a few words; ``others`` are the names of its test's checks. Empty where unknown."""
     name = check["name"]
+    beside, words = _BESIDE.get(name, ("", ""))
+    if beside in others:
+        return words
     prefix = next((each for each in _PREFIXES if name.startswith(f"{each}-")), "")
     return MEANINGS.get(name) or MEANINGS.get(prefix, "")
 

@@ -92,6 +92,8 @@ def test_every_check_of_a_shipped_evaluator_is_explained_and_no_other() -> None:
         name for file in services.glob("*/service.yml") for name in yaml.safe_load(file.read_text()).get("checks", ())
     }
     assert [name for name in names if not meaning({"name": name.replace("*", "blue")})] == []
+    assert meaning({"name": "distance"}, ["distance", "max-speed"]) == "distance that the vehicle drove"
+    assert meaning({"name": "distance"}, ["mean", "distance"]) == "largest distance of a sample from the target"
     of_the_test = {"slow-answers", "uncopied-sample-times"}
     assert {*MEANINGS} - names - of_the_test == {"peak-memory", "processor-time", "processor-share"}
 

@@ -89,7 +89,7 @@ def test_the_page_leads_to_spec_and_recording(tmp_path: Path, monkeypatch: pytes
     assert page.count('class="about"') == 1
     assert re.findall(r'href="([^"#]*)"', page) == ["data:,", "../../t/t.dodo.yml", "test/test.rec"]
     assert "<dt>Test</dt><dd>t/gone.dodo.yml</dd>" in page
-    assert '<span title="samples, detections or answers that came too late to count"><b>late</b>' in page
+    assert '<span title="samples or detections that came too late to be judged, ignored"><b>late</b>' in page
     assert "<b>mean</b> 2</span>" in page
     assert "<td>at most 0.75\u00a0s</td><td>0.25\u00a0s</td>" in page
 

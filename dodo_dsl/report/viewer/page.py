@@ -80,6 +80,7 @@ class SpecLines:
 
 def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters) -> Iterator[dict[str, Any]]:
     """All checks, each with the places of its limit: the parameter's, or the service's where it is set by default."""
+    names = [check["name"] for check in outcome.checks]
     for check in outcome.checks:
         places = list(limit_places(plan, check["name"], recorded)) if check.get("limit") else []
         yield {
@@ -88,7 +89,7 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters)
             "limits": [shown(limit, 80) for limit in words.limits(check)],
             "ok": bool(check["ok"]),
             "follows": words.only_follows(check, outcome.checks),
-            "meaning": shown(words.meaning(check), 200),
+            "meaning": shown(words.meaning(check, names), 200),
             "bar": words.bar_place(check),
             "places": [
                 {"file": shown(place.file, 400), "line": place.line, "text": lines.line(place), "flag": flag}
