@@ -65,7 +65,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 pytest.mark.flaky(reruns=REALTIME_RERUNS, reruns_delay=REALTIME_REST_S, rerun_except=[HANGS])
             )
         if item.get_closest_marker("engine"):
-            item.add_marker(pytest.mark.timeout(ENGINE_LIMIT_S))
+            # not its set-up, where the first of them builds the images: that takes what the machine needs
+            item.add_marker(pytest.mark.timeout(ENGINE_LIMIT_S, func_only=True))
             item.add_marker(pytest.mark.flaky(reruns=1, only_rerun=["Read timed out", "TimeoutExpired"]))
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
