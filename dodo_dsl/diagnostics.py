@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from dodo_dsl.terminal import cells, columns, excerpt, json_text, printable
+from dodo_dsl.terminal import columns, excerpt, json_text, printable
 
 Severity = Literal["error", "warning"]
 Piece = tuple[str, str]
@@ -132,13 +132,13 @@ def _code_frame(span: Span, width: int) -> Iterator[Piece]:
     if line is None or not 0 < span.column <= len(line) + 1:
         return
     gutter = str(span.line)
-    room = width - len(f"  {gutter} | ") - (not cells(printable(line[span.column - 1 : span.column])))
+    room = width - len(f"  {gutter} | ") - (span.column > len(line))
     before, place, behind = excerpt(line, span.column - 1, span.length, room)
     yield f"  {gutter} | ", "gutter"
     yield f"{before}{place}{behind}\n", ""
     yield f"  {' ' * len(gutter)} | ", "gutter"
-    yield " " * cells(before), ""
-    yield "^" * max(1, cells(place)), "mark"
+    yield " " * len(before), ""
+    yield "^" * max(1, len(place)), "mark"
     yield "\n", ""
 
 

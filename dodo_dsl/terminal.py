@@ -7,7 +7,6 @@ and the log of CI lines such as ``::error::`` or ``##[error]``.
 import json
 import re
 import shutil
-import unicodedata
 from collections.abc import Iterable
 from typing import Any, TextIO, cast
 
@@ -42,52 +41,21 @@ def width_of(stream: TextIO) -> int | None:
 
 
 def clipped(text: str, width: int | None) -> str:
-    """The start of printable text that fits into so many columns, with ``…`` where some is left out."""
-    if width is None or cells(text) <= width:
-        return text
-    return text[: _fitting(text, width - 1)].rstrip() + "…"
-
-
-def cells(text: str) -> int:
-    """How many columns a terminal takes for printable text: none for marks on a letter, two for wide characters."""
-    if text.isascii():
-        return len(text)
-    return sum(_cells(character) for character in text)
-
-
-def _cells(character: str) -> int:
-    if unicodedata.category(character) in ("Mn", "Me"):
-        return 0
-    return 2 if unicodedata.east_asian_width(character) in "WF" else 1
+    """The start of printable text that fits into so many characters, with ``…`` where some is left out."""
+    return text if width is None or len(text) <= width else text[: width - 1].rstrip() + "…"
 
 
 def excerpt(line: str, start: int, length: int, room: int) -> tuple[str, str, str]:
-    """The part of a line around a place that fits into so many columns: what is before the place, in it and behind it.
+    """The part of a line around a place that fits into so many characters: what is before it, in it and behind it.
 
     The place begins at character ``start`` and is cut where it is too long; ``…`` stands for what is left out.
     """
-    begin, end = max(0, start - room), start + room
-    before, behind = printable(line[begin:start]), printable(line[start:end])
-    marked = min(length, len(behind))
-    if begin == 0 and end >= len(line) and cells(before + behind) <= room:
-        return before, behind[:marked], behind[marked:]
-    room -= 2  # for what stands for the rest
-    least = max(room // 4, (room - cells(behind[:marked])) // 2, room - cells(behind))
-    kept = _fitting(before[::-1], least)
-    shown = _fitting(behind, room - cells(before[len(before) - kept :]))
-    head = "…" if kept < start else ""
-    tail = "…" if start + shown < len(line) else ""
-    in_place = behind[: min(marked, shown)]
-    return head + before[len(before) - kept :], in_place, behind[len(in_place) : shown] + tail
-
-
-def _fitting(text: str, room: int) -> int:
-    """How many characters from the start fit into so many columns."""
-    for number, character in enumerate(text):
-        room -= _cells(character)
-        if room < 0:
-            return number
-    return len(text)
+    text = printable(line)
+    first = max(0, min(start - room // 4, len(text) - room))
+    head, tail = "…" * (first > 0), "…" * (first + room < len(text))
+    last = first + room - len(tail)
+    end = min(start + length, last)
+    return head + text[first + len(head) : start], text[start:end], text[end:last] + tail
 
 
 def harmless(text: str) -> str:
