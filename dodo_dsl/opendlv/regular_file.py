@@ -22,9 +22,9 @@ class NotAFile(OSError):
     usage = True
 
 
-def opened(path: Path) -> io.FileIO:
+def opened(path: Path, flags: int = 0) -> io.FileIO:
     """A regular file to read, without a buffer; raises NotAFile, IsADirectoryError and OSError."""
-    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC | flags)
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISREG(mode):
         return io.FileIO(descriptor, "rb")

@@ -9,7 +9,6 @@ import io
 import json
 import os
 import shutil
-import stat
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -83,7 +82,7 @@ def _copy_test(source: Path, target: Path, test: JoinedTest, sentences: list[str
                     (target / name).write_text(text, encoding="ascii")
                     page.write_html(target)
                 elif is_of_a_test(name):
-                    with opened(path) as file:
+                    with _opened(path) as file:
                         (target / name).parent.mkdir(parents=True, exist_ok=True)
                         with (target / name).open("xb") as copy:
                             shutil.copyfileobj(file, copy)
@@ -91,16 +90,11 @@ def _copy_test(source: Path, target: Path, test: JoinedTest, sentences: list[str
                 sentences.append(f"{path} is left out{' with its page' if name == DATA else ''}: {problem}")
 
 
-def opened(path: Path) -> io.FileIO:
-    """A regular file to read; raises NotCopied for anything else, symlinks included."""
+def _opened(path: Path) -> io.FileIO:
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+        return regular_file.opened(path, os.O_NOFOLLOW)
     except OSError as error:
         raise NotCopied("it is a symlink" if error.errno == errno.ELOOP else str(error.strerror)) from None
-    if stat.S_ISREG(os.fstat(descriptor).st_mode):
-        return io.FileIO(descriptor, "rb")
-    os.close(descriptor)
-    raise NotCopied("it is not a regular file")
 
 
 _BEGIN, _END = f"var {VARIABLE} = ", ";\n"
@@ -108,7 +102,7 @@ _BEGIN, _END = f"var {VARIABLE} = ", ";\n"
 
 def read_document(path: Path, outcome: Outcome) -> dict[str, Any]:
     """The value that a ``drive.js`` assigns, by the name of ``outcome``; raises NotCopied for anything else."""
-    with opened(path) as file:
+    with _opened(path) as file:
         data = file.read(regular_file.MOST_BYTES + 1)
     if len(data) > regular_file.MOST_BYTES:
         raise NotCopied(f"it is larger than {regular_file.MOST_BYTES} bytes")
