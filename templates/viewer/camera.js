@@ -2,10 +2,9 @@
 "use strict";
 
 dodo.camera = (function () {
-  const { test, at, channels, field, frames, frameAt } = dodo.data;
+  const { test, at, channels, field, frames, frameAt, kinds } = dodo.data;
   const { choice, make, svg } = dodo.dom;
   const videos = test.videos.filter((each) => each.file).map((each) => ({ ...each, times: Float32Array.from(each.times) }));
-  const NAMES = { hit: "true positives", false: "false positives", missed: "missed" };
   const TEXTS = { hit: (each) => each.score.toFixed(2), false: (each) => `false ${each.label}`, missed: (each) => `missed ${each.label}` };
   const SAME = 1e-3;
   const WIDE = 640;
@@ -44,7 +43,7 @@ dodo.camera = (function () {
     const frame = frameAt(time);
     const n = pictured(time);
     if (!frame) return n < 0 ? "no frame yet" : `frame of ${video.times[n].toFixed(2)} s`;
-    const counts = Object.keys(NAMES).map((kind) => `${frame[kind].length} ${NAMES[kind]}`);
+    const counts = Object.entries(kinds).map(([kind, name]) => `${frame[kind].length} ${name}`);
     const found = `frame of ${frame.time.toFixed(2)} s: ${frame.isKnown ? counts.join(", ") : "no true boxes are known"}`;
     return video && n < 0 ? `${found}; it was not recorded` : found;
   }

@@ -42,10 +42,8 @@ dodo.cursor = (function () {
     tell();
   }
 
-  const states = [];
-  function tell() {
-    for (const state of states) state(frame !== null);
-  }
+  let tellState = () => {};
+  const tell = () => tellState(frame !== null);
 
   function linked() {
     const found = /^#t=(\d+(?:\.\d*)?)$/.exec(location.hash);
@@ -67,6 +65,6 @@ dodo.cursor = (function () {
     toggle: () => (frame === null ? play() : pause()),
     setSpeed: (value) => (speed = value),
     follow: (follower) => followers.push(follower),
-    whenPlaying: (state) => states.push(state),
+    whenPlaying: (state) => (tellState = state),
   };
 })();

@@ -33,6 +33,7 @@ dodo.data = (function () {
     at,
     frames,
     frameTimes,
+    kinds: { hit: "true positives", missed: "missed", false: "false positives" },
     frameAt: (time) => frames[at(frameTimes, time + 1e-3)] || null,
     channel: (message, sender) => channels.find((c) => c.message === message && c.sender === sender),
     field: (found, name) => found && found.fields.find((f) => f.name === name),

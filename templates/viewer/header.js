@@ -5,7 +5,6 @@ dodo.header = (function () {
   const { cursor } = dodo;
   const { choice, make, seconds } = dodo.dom;
   const { test, moment, files, spec } = dodo.data.test;
-  const [STEP, LONG] = [0.1, 1];
 
   // What repeats the test; repetitions and copies of it have the same name but for their number.
   function command() {
@@ -33,43 +32,18 @@ dodo.header = (function () {
     return files.includes("test.rec") ? [...found, copier("Copy MCAP command", mcap)] : found;
   }
 
-  function pressed(event) {
-    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("select, input[type=search]")) return;
-    const size = event.shiftKey ? LONG : STEP;
-    const actions = {
-      ArrowLeft: () => cursor.move(cursor.time() - size),
-      ArrowRight: () => cursor.move(cursor.time() + size),
-      Home: () => cursor.move(0),
-      End: () => cursor.move(cursor.last),
-      " ": () => cursor.toggle(),
-      d: () => cursor.move(moment.time),
-    };
-    if (event.key === " " && event.target.closest("button, summary")) return;
-    if (!Object.hasOwn(actions, event.key)) return;
-    event.preventDefault();
-    actions[event.key]();
-  }
-
   function transport(parent) {
-    const button = (text, title, action) => make("button", { title, "aria-label": title, onclick: action }, text);
-    const play = button("▶", "Play (space)", () => cursor.toggle());
-    const slider = make("input", { type: "range", min: 0, max: cursor.last, step: 0.01, "aria-label": "Time of the test in seconds" });
+    const play = make("button", { "aria-label": "Play", onclick: cursor.toggle }, "▶");
+    const slider = make("input", { type: "range", min: 0, max: cursor.last, step: 0.05, "aria-label": "Time of the test in seconds" });
     slider.addEventListener("input", () => cursor.move(Number(slider.value)));
     const mark = make("span", { class: `mark ${test.outcome}`, title: `Decided at ${seconds(moment.time)}: ${moment.what}` });
     mark.style.setProperty("--share", moment.time / cursor.last);
     const speed = choice("Speed", [0.1, 0.25, 0.5, 1, 2, 5].map((each) => [each, `${each}×`]), (value) => cursor.setSpeed(Number(value)));
     speed.value = 1;
     const time = make("output", {});
-    const jump = { class: "jump", title: `${seconds(moment.time)}: ${moment.what} (D)`, onclick: () => cursor.move(moment.time) };
-    parent.append(
-      play,
-      button("‹", "Back 0.1 s (left arrow; with shift 1 s)", () => cursor.move(cursor.time() - STEP)),
-      button("›", "On 0.1 s (right arrow; with shift 1 s)", () => cursor.move(cursor.time() + STEP)),
-      make("div", { class: "line" }, slider, mark),
-      time,
-      speed,
-      make("button", jump, test.outcome === "passed" ? "Jump to verdict" : "Jump to failure"),
-    );
+    const jump = { class: "jump", title: `${seconds(moment.time)}: ${moment.what}`, onclick: () => cursor.move(moment.time) };
+    const back = make("button", jump, test.outcome === "passed" ? "Jump to verdict" : "Jump to failure");
+    parent.append(play, make("div", { class: "line" }, slider, mark), time, speed, back);
     cursor.follow((now) => {
       slider.value = now;
       slider.setAttribute("aria-valuetext", seconds(now));
@@ -90,7 +64,6 @@ dodo.header = (function () {
     part("files").append(...links());
     part("actions").append(copier("Copy command", command()));
     if (dodo.data.test.duration > 0) transport(part("transport"));
-    document.addEventListener("keydown", pressed);
   }
 
   return { show, command };

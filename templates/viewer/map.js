@@ -40,7 +40,8 @@ dodo.map = (function () {
     return element;
   }
 
-  function trace({ poses }, until = Infinity) {
+  function trace(until) {
+    const { poses } = driven;
     const every = Math.ceil(poses.length / MOST);
     const kept = poses.filter((one, n) => one.time <= until && (n % every === 0 || n === poses.length - 1));
     return kept.map(({ x, y }, n) => `${n ? "L" : "M"}${x} ${y}`).join("");
@@ -70,9 +71,9 @@ dodo.map = (function () {
     const own = vehicle();
     const moving = bodies.map((body) => {
       const shape = painted(svg("path", { class: "body", d: closed(body.outline) }), "fill", body.colour);
-      return [body, shape, name(body.name, "other", 0, 0), svg("path", { class: "trail" })];
+      return [body, shape, name(body.name, "other", 0, 0)];
     });
-    const parts = [...ground, svg("path", { class: "whole", d: trace(driven) }), now, ...moving.flatMap(([, shape, text, trail]) => [trail, shape, text])];
+    const parts = [...ground, svg("path", { class: "whole", d: trace(Infinity) }), now, ...moving.flatMap(([, ...each]) => each)];
     if (test.test.outcome !== "passed") {
       const { x, y } = test.moment.x === null ? pose(driven, test.moment.time) : test.moment;
       parts.push(still(x, y, svg("path", { class: "failure", d: "M-10 0a10 10 0 1 0 20 0a10 10 0 1 0 -20 0M-5 -5L5 5M-5 5L5 -5" })));
@@ -84,12 +85,11 @@ dodo.map = (function () {
       const [left, low, wide, high] = box(time);
       element.setAttribute("viewBox", `${left} ${-low - high} ${wide} ${high}`);
       const metres = Math.max(wide / (element.clientWidth || 1), high / (element.clientHeight || 1));
-      now.setAttribute("d", trace(driven, time));
+      now.setAttribute("d", trace(time));
       own.setAttribute("transform", placed(pose(driven, time)));
-      for (const [body, shape, text, trail] of moving) {
+      for (const [body, shape, text] of moving) {
         const at = pose(body, time);
         shape.setAttribute("transform", placed(at));
-        trail.setAttribute("d", trace(body, time));
         fixed.find(([group]) => group === text).splice(1, 2, at.x, at.y);
       }
       for (const [group, x, y] of fixed) group.setAttribute("transform", `translate(${x} ${y}) scale(${metres} ${-metres})`);
@@ -132,5 +132,5 @@ dodo.map = (function () {
     });
   }
 
-  return { show, pose: (time) => pose(driven, time) };
+  return { show };
 })();

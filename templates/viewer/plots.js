@@ -7,7 +7,6 @@ dodo.plots = (function () {
   const { make, number, withUnit, colour } = dodo.dom;
   const [AXIS, RIGHT, LEAST] = [56, 12, 0.02];
   const MARKS = ["", "warned", "failed"];
-  const KINDS = [["false", "false positives"], ["missed", "missed"], ["hit", "true positives"]];
   const charts = new Set();
   let range = [0, cursor.last];
 
@@ -26,16 +25,8 @@ dodo.plots = (function () {
     return { title: field.title, unit: field.unit, times: channel.times, values: field.values, note };
   }
 
-  // Boxes of each frame by what became of them, one on top of the other.
-  function detected() {
-    const sums = KINDS.map((_, n) => data.frames.map((frame) => KINDS.slice(n).reduce((sum, [kind]) => sum + frame[kind].length, 0)));
-    const legend = [...KINDS].reverse().map(([kind, name]) => make("span", { class: `key ${kind}` }, name));
-    const text = (time) => {
-      const frame = data.frameAt(time);
-      return frame ? `${frame.hit.length} true, ${frame.missed.length} missed, ${frame.false.length} false` : "–";
-    };
-    return { title: "Boxes of each frame", unit: "", note: legend, times: data.frameTimes, stacked: sums, values: sums[0], min: 0, isPlain: true, text };
-  }
+  // How many boxes of each frame became what.
+  const counted = ([kind, name]) => ({ title: `${name} in each frame`, unit: "", times: data.frameTimes, values: data.frames.map((frame) => frame[kind].length), min: 0, isPlain: true });
 
   const others = () => data.channels.filter((channel) => !channel.message.startsWith("dodo."));
   // Of a message with several fields those that are not 0 all the time: the others can be added.
@@ -45,7 +36,7 @@ dodo.plots = (function () {
     const isOf = (channel, { message, sender }) => channel.message === message && (sender === null || channel.sender === sender);
     const channels = data.test.messages.flatMap((each) => data.channels.filter((channel) => isOf(channel, each)));
     const fields = channels.flatMap((channel) => used(channel.fields).map((field) => plain(channel, field)));
-    return [...data.test.judged.map(recorded), ...fields, ...(data.frames.length ? [detected()] : [])];
+    return [...data.test.judged.map(recorded), ...fields, ...(data.frames.length ? Object.entries(data.kinds).map(counted) : [])];
   }
 
   function heights(signal) {
@@ -133,9 +124,7 @@ dodo.plots = (function () {
   // A chart in an element that fills it; `read` takes the time under the pointer, null where there is none.
   function chart(element, signal, read) {
     const look = { stroke: () => colour("soft"), grid: { stroke: () => colour("grid"), width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif" };
-    const bars = uPlot.paths.bars({ size: [0.9, 40, 2] });
     const line = { stroke: () => colour("line"), width: 1.6, points: { show: false } };
-    const bar = ([kind]) => ({ stroke: () => colour(kind), fill: () => colour(kind), paths: bars, width: 0, points: { show: false } });
     const gaps = (values) => Array.from(values, (value) => (Number.isFinite(value) ? value : null));
     const [low, high] = heights(signal);
     const u = new uPlot(
@@ -148,7 +137,7 @@ dodo.plots = (function () {
           y: false,
           sync: { key: "time", setSeries: false },
           drag: { x: true, y: false, dist: 4, setScale: false },
-          points: { show: !signal.isAxis && !signal.stacked },
+          points: { show: !signal.isAxis },
           bind: {
             mousedown: (self, _, begin) => (event) => (event.shiftKey ? pan(self, event) : begin(event)),
             dblclick: () => () => zoom(0, cursor.last),
@@ -161,12 +150,11 @@ dodo.plots = (function () {
             ...look,
             size: AXIS,
             space: 26,
-            ...(signal.stacked ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500] } : {}),
             values: (_, ticks) => (signal.isAxis ? [] : ticks.map(number)),
             grid: { ...look.grid, show: !signal.isAxis },
           },
         ],
-        series: [{}, ...(signal.stacked ? KINDS.map(bar) : [line])],
+        series: [{}, line],
         hooks: {
           drawClear: [(self) => behind(self, signal)],
           draw: [(self) => marks(self, signal)],
@@ -174,7 +162,7 @@ dodo.plots = (function () {
           setSelect: [(self) => self.select.width > 4 && select(self)],
         },
       },
-      [signal.times, ...(signal.stacked || [gaps(signal.values)])],
+      [signal.times, gaps(signal.values)],
       element,
     );
     const now = make("div", { class: "now-line" });
@@ -209,11 +197,10 @@ dodo.plots = (function () {
     const value = make("output", {});
     const drop = () => (charts.delete(one), one.u.destroy(), figure.remove());
     const close = isRemovable && make("button", { class: "plain", title: "Remove this plot", onclick: drop }, "×");
-    const notes = make("small", {}, ...[signal.note || ""].flat());
     const plot = make("div", { class: "plot", role: "img", "aria-label": signal.title });
-    const figure = make("figure", {}, make("figcaption", {}, make("b", {}, signal.title), notes, value, close || ""), plot);
+    const figure = make("figure", {}, make("figcaption", {}, make("b", {}, signal.title), make("small", {}, signal.note || ""), value, close || ""), plot);
     parent.append(figure);
-    const read = (time) => (value.textContent = (signal.text || ((moment) => text(signal, moment)))(time ?? cursor.time()));
+    const read = (time) => (value.textContent = text(signal, time ?? cursor.time()));
     const one = chart(plot, signal, read);
     one.read = read;
     read(null);
