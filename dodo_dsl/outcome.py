@@ -29,9 +29,6 @@ def one_of(*words: str) -> Meta:
     return Meta(pattern=f"^({'|'.join(words)})$", extra_json_schema={"enum": list(words)})
 
 
-Level = Annotated[str, one_of(*LEVELS)]
-
-
 @dataclass(frozen=True)
 class Wait:
     """What some services of a test ran on processors together, and how long one of them waited for one."""
@@ -217,8 +214,8 @@ class Verdict(TypedDict):
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What became of a test."""
+class NamedTest:
+    """Which test it is."""
 
     name: str
     """Name of the instance."""
@@ -226,8 +223,22 @@ class Outcome:
     """The name in folders and jobs."""
     spec: str
     """The spec's file, relative to its repository, or else to its registry."""
-    level: Level
+    level: Annotated[str, one_of(*LEVELS)]
     """Software, data or hardware in the loop: the world is simulated, recorded or real."""
+
+
+@dataclass(frozen=True)
+class NotRun(NamedTest):
+    """A test of a run that never began; it has no outcome."""
+
+    reason: str
+    """Why it never began."""
+
+
+@dataclass(frozen=True)
+class Outcome(NamedTest):
+    """What became of a test."""
+
     kind: Annotated[str, one_of(*KINDS)]
     """What was judged: detections, a signal, or driving."""
     outcome: Result
@@ -273,22 +284,6 @@ class Outcome:
     """The check that the test names to be shown first; empty if it names none."""
     decided_by: str = ""
     """The evaluator whose verdict is the outcome; empty if several passed, or something else decided."""
-
-
-@dataclass(frozen=True)
-class NotRun:
-    """A test of a run that never began; it has no outcome."""
-
-    name: str
-    """Name of the instance."""
-    slug: str
-    """The name in folders and jobs."""
-    spec: str
-    """The spec's file, relative to its repository, or else to its registry."""
-    level: Level
-    """Software, data or hardware in the loop: the world is simulated, recorded or real."""
-    reason: str
-    """Why it never began."""
 
 
 def with_margin(check: Mapping[str, Any]) -> Check:

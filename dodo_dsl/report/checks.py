@@ -39,11 +39,6 @@ def number(value: float, digits: int = _DIGITS) -> str:
     return f"{value:.{decimals}f}".rstrip("0").rstrip(".") if decimals > 0 else f"{value:.0f}"
 
 
-def value_text(value: float | None, unit: str) -> str:
-    """``0.052 m``, or ``none``"""
-    return "none" if value is None else f"{number(value)} {unit}".rstrip()
-
-
 def measured(check: Check) -> str:
     """A check's value with its unit, in as many digits as distinguish it from its limits."""
     value, limits = check["value"], (check.get("limit") or {}).values()
@@ -86,6 +81,10 @@ def check_line(check: Check, checks: Sequence[Check]) -> str:
     if only_follows(check, checks):
         return f"--   {check['name']}: {measured(check)}, when the drive ended"
     return f"{'ok  ' if check['ok'] else 'FAIL'} {in_words(check).replace(' ', ': ', 1)}"
+
+
+def lines(outcome: Outcome) -> list[str]:
+    return [check_line(check, outcome.checks) for check in outcome.checks]
 
 
 def with_margins(check: Check) -> Check:

@@ -72,8 +72,7 @@ def _case(outcome: Outcome, attachment: str | None, link: str | None) -> Any:
         result.text = _plain("\n".join([outcome.reason, *replay, *outcome.last_lines]))
         case.result = [result]
     # GitLab shows the text of a failure in place of this, and takes the attachment from here
-    lines = [checks.check_line(check, outcome.checks) for check in outcome.checks]
-    lines = [_plain(line) for line in [*lines, *(f"note: {note}" for note in outcome.notes)]]
+    lines = [_plain(line) for line in [*checks.lines(outcome), *(f"note: {note}" for note in outcome.notes)]]
     lines += [xml_text(f"{_ATTACHMENT}{attachment}]]")] if attachment else []
     if lines:
         case.system_out = "\n".join(lines)

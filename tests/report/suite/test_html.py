@@ -10,7 +10,7 @@ import pytest
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.comparison import compare
-from dodo_dsl.report.overview import LinkedFiles, breakable, render
+from dodo_dsl.report.overview import LinkedFiles, render
 from dodo_dsl.report.report_folder import write_summaries
 from dodo_dsl.report.results import GivenReport
 from tests.report.joined.reports import check, named, write
@@ -89,7 +89,6 @@ def test_tests_are_searched_and_filtered(chromium: Chromium, tmp_path: Path) -> 
 @pytest.mark.slow
 @pytest.mark.xdist_group("chromium")
 def test_no_column_is_clipped(chromium: Chromium, tmp_path: Path) -> None:
-    """With a picture beside the widest table: checks that failed and follow, and a comparison."""
     outcomes = drives.write(tmp_path, [failures.wall_hit()])
     late = {**check(-12345.678, ok=False, unit="m/s", max=-0.012345), "name": "mean-over-time"}
     new = [
@@ -110,7 +109,7 @@ def test_no_column_is_clipped(chromium: Chromium, tmp_path: Path) -> None:
             for width in (1366, 1024):
                 page.resize(width, 900)
                 page.wait("document.documentElement.scrollWidth <= innerWidth")
-                cells = "Array.from(document.querySelectorAll('.facts-of, .wide, .wide :is(th, td), .row *'))"
+                cells = "Array.from(document.querySelectorAll('.wide, .wide :is(th, td), .row *'))"
                 wide = f"{cells}.filter(e => e.scrollWidth > e.clientWidth + 1 && e.checkVisibility())"
                 assert page.value(f"{wide}.map(e => [e.className, e.textContent, e.scrollWidth])") == [], width
 
@@ -136,12 +135,9 @@ def shown(page: Page) -> list[str]:
 def fill(page: Page, **values: str) -> None:
     values = {"outcome": "all", **values}
     for name in ("search", "outcome"):
-        fill_one = "field.value = value; (field.dispatchEvent ? field : field[0]).dispatchEvent(event)"
-        event = "new Event('input', {bubbles: true})"
         field = f"document.getElementById('_filters').elements['{name}']"
-        page.value(
-            f"((field, value, event) => {{ if (field) {{ {fill_one} }} }})({field}, '{values.get(name, '')}', {event})"
-        )
+        page.value(f"{field}.value = '{values.get(name, '')}'")
+        page.value(f"{field}.dispatchEvent(new Event('input', {{bubbles: true}}))")
 
 
 @pytest.mark.slow
@@ -174,10 +170,6 @@ def test_strings_of_others_are_text(chromium: Chromium, tmp_path: Path) -> None:
     assert (tmp_path / "index.html").stat().st_size < 1_000_000
 
 
-def test_names_of_matrices_break_between_their_values_alone() -> None:
-    assert breakable("t[a=0.45,b=<x>]") == "t<wbr>[a=0.45,<wbr>b=&lt;x&gt;]"
-
-
 def test_a_matrix_is_one_row_and_what_did_not_pass_comes_first() -> None:
-    names = re.findall("<h3>(?:<a[^>]*>)?(.*?)(?:<wbr>.*)?(?:</a>)?</h3>", render(TESTS, files(TESTS)))
+    names = re.findall("<h3>(?:<a[^>]*>)?([^[<]*)", render(TESTS, files(TESTS)))
     assert names == ["sil-b", "dil-m", *["dil-m"] * 4, "hil-c", "sil-a"]

@@ -79,8 +79,8 @@ def test_reports_name_the_worst_instance(tmp_path: Path) -> None:
     outcomes = matrix(x=("passed", 0, 0.03), y=("failed", 3.4, 0.01))
     write_summaries(tmp_path, outcomes)
     page = (tmp_path / "index.html").read_text()
-    assert "<span>worst: wall-margin 0.01\u00a0m</span>" in page
-    assert 'Each cell shows wall-margin, at least 0.02\u00a0m; the worst is <a href="#a--rec-y">' in page
+    assert "<span>worst: wall-margin 0.01 m</span>" in page
+    assert 'Each cell shows wall-margin, at least 0.02 m; the worst is <a href="#a--rec-y">' in page
     assert page.count('<a class="ok" href="#a--rec-x">') == page.count('<a class="no" href="#a--rec-y">') == 1
     worst = "a: 1 of 2 passed, worst is [rec=y]: wall-margin 0.01 m (at least 0.02 m)"
     for verbosity, number in ((Verbosity.NORMAL, 1), (Verbosity.QUIET, 0)):
