@@ -62,23 +62,15 @@ def merged(folder: Path, test: RecordedTest) -> dict[str, Any]:
 def _lines(log: Path, test: RecordedTest) -> Iterator[LogLine]:
     offsets, walls = log_times.read(log)
     times = _test_times(walls, test)
-    for offset, line in _without_times(log):
-        part = bisect_right(offsets, offset) - 1
-        yield line._replace(time=times[part] if part >= 0 else None)
-
-
-def _without_times(log: Path) -> Iterator[tuple[int, LogLine]]:
-    """The lines with their offsets."""
     layer, _, name = log.stem.partition(".")
     level = ""
     for offset, raw in _raw_lines(log):
         line = _ESCAPES.sub("", raw[: 4 * _MOST_TEXT].decode("utf-8", "replace")).rstrip("\r\n ")
-        if not line:
-            continue
-        level = _level(line, level)
-        length = f" … ({len(raw)} bytes)" if len(line) > _MOST_TEXT else ""
-        kind = INFO if not level and layer != _APPLICATION and _IN_PASSING.match(line) else level
-        yield offset, LogLine(None, name or layer, kind, shown(line[:_MOST_TEXT]) + length)
+        if line:
+            level = _level(line, level)
+            kind = INFO if not level and layer != _APPLICATION and _IN_PASSING.match(line) else level
+            part = bisect_right(offsets, offset) - 1
+            yield LogLine(times[part] if part >= 0 else None, name or layer, kind, shown(line, _MOST_TEXT))
 
 
 def _raw_lines(log: Path) -> Iterator[tuple[int, bytes]]:

@@ -1,7 +1,7 @@
 """A test's page: the data of its drive, the lines of the spec that set each limit, and what all pages share."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,54 +35,38 @@ from dodo_dsl.report.viewer.record import read
 from dodo_dsl.report.viewer.recorded import FRAME, Channel, RecordedTest
 from dodo_dsl.report.viewer.units import title_of, unit_of
 
-_OF_THE_TEST = {SLOW_ANSWERS: "max", SAMPLE_TIMES: "sample-times"}
-"""Checks of no evaluator, and the key of the test's ``response`` that asks for them."""
-_OF_USE = {
-    PEAK_MEMORY: "max-memory",
-    PROCESSOR_TIME: "max-processor-time",
-    PROCESSOR_SHARE: "max-processor-share",
+_OF_THE_TEST = {
+    SLOW_ANSWERS: ("response", "max"),
+    SAMPLE_TIMES: ("response", "sample-times"),
+    PEAK_MEMORY: ("resources", "max-memory"),
+    PROCESSOR_TIME: ("resources", "max-processor-time"),
+    PROCESSOR_SHARE: ("resources", "max-processor-share"),
 }
-"""The same of the test's ``resources``; the name of a service follows that of the check."""
+"""Checks of no evaluator, some with the name of a service behind theirs, and where the test asks for them."""
 _MOST_SPEC = 1 << 20
 
 Parameters = Mapping[str, Mapping[str, tuple[str, ...]]]
 """What sets the limits of checks: names of parameters by the evaluator's name and the check's, as they recorded it."""
 
 
-class SpecLines:
-    """Lines of specs by their places, as far as the files can be read from here."""
-
-    def __init__(self, roots: tuple[Path, ...] = ()) -> None:
-        self._roots = roots or (Path.cwd(), package_data.root(), package_data.registry())
-        self._files: dict[str, list[str]] = {}
-
-    def line(self, place: Place) -> str:
-        """The line without its indent; empty if there is no such file any more."""
-        if place.file not in self._files:
-            self._files[place.file] = self._read(place.file)
-        lines = self._files[place.file]
-        return shown(lines[place.line - 1].strip(), 400) if 0 < place.line <= len(lines) else ""
-
-    def text(self, file: str) -> str:
-        """All lines of a file; empty if it cannot be read."""
-        return "\n".join(shown(line) for line in self._read(file))
-
-    def _read(self, name: str) -> list[str]:
-        for root in self._roots:
-            path = root / name
-            try:
-                if path.resolve().is_relative_to(root.resolve()):
-                    return regular_file.text(path, _MOST_SPEC).splitlines()
-            except (OSError, ValueError):
-                continue
-        return []
+def spec_lines(name: str, roots: Sequence[Path] = ()) -> list[str]:
+    """The lines of a spec as far as its file can be read from here; else none."""
+    for root in roots or (Path.cwd(), package_data.root(), package_data.registry()):
+        path = root / name
+        try:
+            if path.resolve().is_relative_to(root.resolve()):
+                return [shown(line) for line in regular_file.text(path, _MOST_SPEC).splitlines()]
+        except (OSError, ValueError):
+            continue
+    return []
 
 
-def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters) -> Iterator[dict[str, Any]]:
+def checks(plan: Plan, outcome: Outcome, recorded: Parameters, roots: Sequence[Path] = ()) -> Iterator[dict[str, Any]]:
     """All checks, each with the places of its limit: the parameter's, or the service's where it is set by default."""
-    names = [check["name"] for check in outcome.checks]
+    names, files = [check["name"] for check in outcome.checks], dict[str, list[str]]()
     for check in outcome.checks:
         places = list(limit_places(plan, check["name"], recorded)) if check.get("limit") else []
+        files |= {place.file: spec_lines(place.file, roots) for _, place in places if place.file not in files}
         yield {
             "name": shown(check["name"], 100),
             "value": shown(words.measured(check), 80),
@@ -92,7 +76,12 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters)
             "meaning": shown(words.meaning(check, names), 200),
             "bar": words.bar_place(check),
             "places": [
-                {"file": shown(place.file, 400), "line": place.line, "text": lines.line(place), "flag": flag}
+                {
+                    "file": shown(place.file, 400),
+                    "line": place.line,
+                    "text": "".join(files[place.file][place.line - 1 : place.line]).strip(),
+                    "flag": flag,
+                }
                 for flag, place in places
             ],
         }
@@ -100,11 +89,9 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters)
 
 def limit_places(plan: Plan, check: str, recorded: Parameters) -> Iterator[tuple[str, Place]]:
     """Where the spec sets the limit of a check, each with the parameter's name, empty for a service's default."""
-    if check in _OF_THE_TEST and "response" in plan.source_map:
-        yield _OF_THE_TEST[check], plan.source_map["response"]
-    for name, flag in _OF_USE.items():
-        if check.startswith(f"{name}-") and "resources" in plan.source_map:
-            yield flag, plan.source_map["resources"]
+    for name, (section, flag) in _OF_THE_TEST.items():
+        if f"{check}-".startswith(f"{name}-") and section in plan.source_map:
+            yield flag, plan.source_map[section]
     for service in plan.services:
         if not service.judge:
             continue
@@ -153,15 +140,14 @@ def write(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> None:
         pictures.write_frame(folder, video, decisive.time)
     if outcome.level != "hil":
         pictures.shrink_snapshot(folder)
-    lines = SpecLines()
     document = {
         "version": VERSION,
         "test": _facts(outcome),
-        "spec": lines.text(outcome.spec),
+        "spec": "\n".join(spec_lines(outcome.spec)),
         "files": [path.name for path in sorted(folder.glob("*.rec"))],
         "duration": test.duration,
         "moment": dataclasses.asdict(decisive),
-        "checks": list(checks(plan, outcome, lines, record.parameters)),
+        "checks": list(checks(plan, outcome, record.parameters)),
         "scene": scene(ground, way),
         "log": log_lines.merged(folder / LOGS, test),
         "channels": [_channel(channel) for channel in test.channels],

@@ -36,8 +36,6 @@ class Video:
     width: int
     height: int
     times: list[float]
-    left: int = 0
-    """Frames before them that are left out."""
 
 
 @dataclass(frozen=True)
@@ -61,24 +59,15 @@ def write(
 
     Of a test that recorded none, they are those that it ``replayed``.
     """
-    paths = [folder / RECORDING, folder / PICTURES_FILE]
-    cameras = [_images(path, sender, messages) for path in paths for sender in _senders(path, messages)]
+    cameras = [
+        images for name in (RECORDING, PICTURES_FILE) for images in _cameras(folder / name, messages)[1].values()
+    ]
     cameras = (cameras or [found for each in replayed if (found := _played(each, test, messages))])[: len(VIDEOS)]
     for images, name in zip(cameras, VIDEOS, strict=False):
         try:
             yield _write(folder / name, images, test.begin, MOST_BYTES // len(cameras))
         except NoVideo as problem:
             yield str(problem)
-
-
-def _senders(recording: Path, messages: MessageSet) -> list[int]:
-    """The sender stamps of the cameras in a recording, which may be missing or empty."""
-    try:
-        with Recording(recording) as opened:
-            rows = opened.rows({messages.id(PICTURES)})
-            return sorted({*opened.index["sender_stamp"][rows].tolist()})  # numpy's unique loads masked arrays
-    except (OSError, RecordingError):
-        return []
 
 
 def _write(target: Path, images: Images, begin: int, most_bytes: int) -> Video:
@@ -93,28 +82,30 @@ def _write(target: Path, images: Images, begin: int, most_bytes: int) -> Video:
     with atomic.replacing(target) as part:
         _mux(part, [(time, image.data) for time, image in kept])
     times = [round((time - begin) / MICROSECONDS, 4) for time, _ in kept]
-    return Video(target.name, first.width, first.height, times, len(images) - len(kept))
+    return Video(target.name, first.width, first.height, times)
 
 
-def _images(recording: Path, sender: int, messages: MessageSet) -> Images:
-    images, id_ = Images(), messages.id(PICTURES)
-    with Recording(recording) as opened:
-        for envelope in opened.envelopes(opened.rows({id_}, sender_stamps={sender})):
-            if not images or envelope.sample_time > images[-1][0]:
-                images.append((envelope.sample_time, messages.decode(id_, envelope.payload)))
-    return images
+def _cameras(recording: Path, messages: MessageSet) -> tuple[int, dict[int, Images]]:
+    """When a recording begins, in us, and its frames by sender stamp; nothing of one that is missing or empty."""
+    found, id_ = dict[int, Images](), messages.id(PICTURES)
+    try:
+        with Recording(recording) as opened:
+            begin = int(opened.index["time"].min()) if len(opened) else 0
+            for envelope in opened.envelopes(opened.rows({id_})):
+                images = found.setdefault(envelope.sender_stamp, [])
+                if not images or envelope.sample_time > images[-1][0]:
+                    images.append((envelope.sample_time, messages.decode(id_, envelope.payload)))
+    except (OSError, RecordingError):
+        return 0, {}
+    return begin, dict(sorted(found.items()))
 
 
 def _played(replayed: Replayed, test: RecordedTest, messages: MessageSet) -> Images:
     """The frames of a recording at the times at which the test announced them, one after the other."""
     announced = test.channel(ANNOUNCED, replayed.sender)
-    try:
-        images = _images(replayed.path, replayed.sender, messages)
-        with Recording(replayed.path) as opened:
-            first = int(opened.index["time"].min()) if len(opened.index) else 0
-    except (OSError, RecordingError):
-        return []
-    played = [image for image in images if replayed.begin <= (image[0] - first) / MICROSECONDS <= replayed.end]
+    begin, cameras = _cameras(replayed.path, messages)
+    images = cameras.get(replayed.sender, [])
+    played = [image for image in images if replayed.begin <= (image[0] - begin) / MICROSECONDS <= replayed.end]
     times = [] if announced is None or announced.every > 1 else announced.times.tolist()
     return [(test.begin + round(t * MICROSECONDS), image) for t, (_, image) in zip(times, played, strict=False)]
 
@@ -126,15 +117,20 @@ def shrink_snapshot(folder: Path) -> None:
     pixels = cv2.imread(str(folder / SNAPSHOT)) if (folder / SNAPSHOT).is_file() else None
     if pixels is not None:
         if not (folder / FRAME).exists():
-            small = cv2.resize(pixels, (_WIDTH, round(_WIDTH * pixels.shape[0] / pixels.shape[1])))
-            atomic.write_bytes(folder / FRAME, cv2.imencode(".jpg", small)[1].tobytes())
+            _write_small(folder, pixels)
         (folder / SNAPSHOT).unlink()
+
+
+def _write_small(folder: Path, pixels: Any) -> None:
+    import cv2
+
+    small = cv2.resize(pixels, (_WIDTH, round(_WIDTH * pixels.shape[0] / pixels.shape[1])))
+    atomic.write_bytes(folder / FRAME, cv2.imencode(".jpg", small)[1].tobytes())
 
 
 def write_frame(folder: Path, video: Video, time: float) -> None:
     """The last frame of a video until a time, as a small picture; nothing if it cannot be decoded. Raises OSError."""
     import av
-    import cv2
 
     wanted, picture = max(time - video.times[0], 0.0), None
     with contextlib.suppress(av.FFmpegError), av.open(str(folder / video.file)) as container:
@@ -144,9 +140,7 @@ def write_frame(folder: Path, video: Video, time: float) -> None:
                 break
             picture = frame
         if picture is not None:
-            height = round(_WIDTH * video.height / video.width)
-            pixels = picture.to_ndarray(format="bgr24", width=_WIDTH, height=height)
-            atomic.write_bytes(folder / FRAME, cv2.imencode(".jpg", pixels)[1].tobytes())
+            _write_small(folder, picture.to_ndarray(format="bgr24"))
 
 
 def _kept(images: Images, most_bytes: int) -> Images:

@@ -68,90 +68,72 @@ class RecordedTest:
 def read(path: Path, messages: MessageSet) -> RecordedTest:
     """The recording of a test; raises OSError and RecordingError."""
     with Recording(path) as recording:
-        index = recording.index
-        begins = recording.rows({messages.id(_BEGIN)})
-        times, rows = index["time"], np.arange(len(index))
-        if len(begins):
-            begin = int(times[begins[0]])
-        elif len(index):
-            begin = int(times.min())
-        else:
+        times = recording.index["time"]
+        if not len(times):
             return RecordedTest()
+        begins = recording.rows({messages.id(_BEGIN)})
+        begin = int(times[begins[0]] if len(begins) else times.min())
         seconds = (times - begin) / MICROSECONDS
-        rows = rows[np.abs(seconds) < FAR]
-        clock = _Clock(begin)
-        channels = list(_channels(recording, messages, rows, clock))
+        walls = list[tuple[Numbers, Values]]()
+        channels = tuple(_channels(recording, messages, np.flatnonzero(np.abs(seconds) < FAR), begin, walls))
         ends = seconds[recording.rows({messages.id(_END)})]
     last = max((float(c.times[-1]) for c in channels if len(c.times)), default=0.0)
-    duration = float(ends[-1]) if len(ends) else last
-    return RecordedTest(tuple(channels), max(duration, 0.0), begin, *clock.table())
+    return RecordedTest(channels, max(float(ends[-1]) if len(ends) else last, 0.0), begin, *_clock(begin, walls))
 
 
-class _Clock:
-    """Pairs of wall time and test time, from messages that have both."""
-
-    def __init__(self, begin: int) -> None:
-        self._begin = begin
-        self._walls: list[Numbers] = []
-        self._moments: list[Values] = []
-
-    def seconds(self, sampled: Numbers) -> Values:
-        found: Values = (sampled - self._begin) / MICROSECONDS
-        return found
-
-    def note(self, sent: Numbers, received: Numbers, sampled: Numbers) -> None:
-        """Messages whose sample time is the test's, and whose arrival, or else departure, is the machine's."""
-        self._walls.append(np.where(received > 0, received, sent))
-        self._moments.append(self.seconds(sampled))
-
-    def table(self) -> tuple[Values, Values]:
-        """Wall times ascending, and the latest test time until each."""
-        if not self._walls:
-            return np.empty(0), np.empty(0)
-        walls, moments = np.concatenate(self._walls), np.concatenate(self._moments)
-        known = (walls > 0) & (np.abs(walls - self._begin) > FAR * MICROSECONDS)
-        if not known.any():  # in real time both are one; in lockstep departures may be the test's, too
-            return np.array([self._begin, self._begin + FAR * MICROSECONDS]), np.array([0.0, FAR])
-        walls, moments = walls[known], moments[known]
-        order = np.argsort(walls, kind="stable")
-        walls, moments = walls[order], np.maximum.accumulate(moments[order])
-        return walls.astype(np.float64), moments
+def _clock(begin: int, pairs: list[tuple[Numbers, Values]]) -> tuple[Values, Values]:
+    """Wall times ascending, and the latest test time until each, of messages that have both."""
+    if not pairs:
+        return np.empty(0), np.empty(0)
+    walls, moments = (np.concatenate(each) for each in zip(*pairs, strict=True))
+    known = (walls > 0) & (np.abs(walls - begin) > FAR * MICROSECONDS)
+    if not known.any():  # in real time both are one; in lockstep departures may be the test's, too
+        return np.array([begin, begin + FAR * MICROSECONDS]), np.array([0.0, FAR])
+    walls, moments = walls[known], moments[known]
+    order = np.argsort(walls, kind="stable")
+    return walls[order].astype(np.float64), np.maximum.accumulate(moments[order])
 
 
-def _channels(recording: Recording, messages: MessageSet, rows: Numbers, clock: _Clock) -> Iterator[Channel]:
+def _channels(
+    recording: Recording, messages: MessageSet, rows: Numbers, begin: int, walls: list[tuple[Numbers, Values]]
+) -> Iterator[Channel]:
     index = recording.index[rows]
     keys = index["data_type"].astype(np.int64) << 32 | index["sender_stamp"]
     order = np.argsort(keys, kind="stable")
     cuts = np.flatnonzero(np.diff(keys[order])) + 1
     for group in np.split(rows[order], cuts)[:MOST_CHANNELS] if len(rows) else ():
-        id_ = int(recording.index["data_type"][group[0]])
-        if id_ not in messages.ids():
+        id_, sender = (int(recording.index[column][group[0]]) for column in ("data_type", "sender_stamp"))
+        if id_ not in messages.ids() or (id_ in OWN_IDS and messages.name(id_) != _BEGIN):
             continue
-        name = messages.name(id_)
-        if id_ in OWN_IDS and name != _BEGIN:
-            continue
-        sender = int(recording.index["sender_stamp"][group[0]])
         every = -(-len(group) // MOST_SAMPLES)
-        if name == PICTURES:
-            yield Channel(name, sender, clock.seconds(np.sort(recording.index["time"][group[::every]])), {}, every)
-            continue
-        yield _channel(recording, messages, name, sender, group[::every], clock, every)
+        if messages.name(id_) == PICTURES:
+            times = (np.sort(recording.index["time"][group[::every]]) - begin) / MICROSECONDS
+            yield Channel(PICTURES, sender, times, {}, every)
+        else:
+            yield _channel(recording, messages, id_, sender, group[::every], begin, every, walls)
 
 
 def _channel(
-    recording: Recording, messages: MessageSet, name: str, sender: int, rows: Numbers, clock: _Clock, every: int
+    recording: Recording,
+    messages: MessageSet,
+    id_: int,
+    sender: int,
+    rows: Numbers,
+    begin: int,
+    every: int,
+    walls: list[tuple[Numbers, Values]],
 ) -> Channel:
-    times, parts = list[Values](), list[list[message_columns.Column]]()
-    goods = []
+    """A channel; ``walls`` gets the times of arrival, or else of departure, with those of the test."""
+    name = messages.name(id_)
+    times, parts, goods = list[Values](), list[list[message_columns.Column]](), []
     for batch in recording.batches(rows):
         sent, received, sampled = batch.times
-        table = batch.table
         found, good = message_columns.decode(
-            messages.layout(name), batch.data, table[Fact.PAYLOAD], table[Fact.PAYLOAD_END]
+            messages.layout(name), batch.data, batch.table[Fact.PAYLOAD], batch.table[Fact.PAYLOAD_END]
         )
-        moments = np.where(sampled > 0, sampled, np.where(received > 0, received, sent))
-        clock.note(sent, received, moments)
-        times.append(clock.seconds(moments))
+        arrived = np.where(received > 0, received, sent)
+        times.append((np.where(sampled > 0, sampled, arrived) - begin) / MICROSECONDS)
+        walls.append((arrived, times[-1]))
         parts.append(found)
         goods.append(good)
     seconds, good = np.concatenate(times), np.concatenate(goods)
