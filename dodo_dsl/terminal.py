@@ -35,16 +35,6 @@ def columns(stream: TextIO | None = None) -> int:
     return max(_NARROWEST, min(shutil.get_terminal_size((usual, 0)).columns, _MOST_COLUMNS))
 
 
-def width_of(stream: TextIO) -> int | None:
-    """How many columns a line may have on the stream's terminal; None if it is a file or a pipe."""
-    return columns(stream) if stream.isatty() else None
-
-
-def clipped(text: str, width: int | None) -> str:
-    """The start of printable text that fits into so many characters, with ``…`` where some is left out."""
-    return text if width is None or len(text) <= width else text[: width - 1].rstrip() + "…"
-
-
 def excerpt(line: str, start: int, length: int, room: int) -> tuple[str, str, str]:
     """The part of a line around a place that fits into so many characters: what is before it, in it and behind it.
 

@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
-from dodo_dsl.cli import display, selection
+from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, shown_path
 from dodo_dsl.spec.manifest import in_words
-from dodo_dsl.spec.model import LEVEL_WORDS, Spec
-from dodo_dsl.terminal import clipped, json_text, printable, width_of
+from dodo_dsl.spec.model import LEVELS, Spec
+from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
   dodo list                 the tests of the deployment
   dodo list 'sil-*' 'sil-perception[light=1]'    some of them
-  dodo list -v              each instance of a matrix, and whole descriptions
+  dodo list -v              each instance of a matrix
   dodo list --services      the services that a test may use
   dodo list --services integrator    one service: parameters, messages
   dodo list --json          the same as JSON
@@ -32,9 +32,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--services", nargs="?", const="", metavar="NAME", help="list services instead of tests, or describe one"
     )
     parser.add_argument("--json", action="store_true", help="output as JSON")
-    parser.add_argument(
-        "-v", "--verbose", action="store_true", help="list each instance of a matrix, and whole descriptions"
-    )
+    parser.add_argument("-v", "--verbose", action="store_true", help="list each instance of a matrix")
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
@@ -44,14 +42,12 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     everything = selection.select(options.test, (), ()) if options.test else load([], services_only=of_services)
     if options.services:
         return _explain(everything, options.services, stdout)
-    width = None if options.verbose else width_of(stdout)
     if options.json:
         stdout.write(json_text(_services(everything) if of_services else _tests(everything)))
     elif of_services:
-        services = [(row["name"], row["layers"], row["description"]) for row in _services(everything)]
-        _table(services, _widths(services), stdout, width)
+        _table([tuple(row.values()) for row in _services(everything)], stdout)
     else:
-        _write_levels(everything.specs, options.verbose, stdout, width)
+        _table(_rows(everything.specs, options.verbose), stdout)
     checked = everything if options.test else without_unsatisfied(everything)
     stderr.write(selection.left_out(checked))
     if checked.ok:
@@ -119,20 +115,8 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
     return Exit.OK
 
 
-def _write_levels(specs: Sequence[Spec], unfolded: bool, stdout: TextIO, width: int | None) -> None:
-    """A table for each level, with the same columns; a matrix is one row unless ``unfolded``."""
-    of_levels: dict[str, list[Spec]] = defaultdict(list)
-    for spec in specs:
-        of_levels[spec.level if spec.level in LEVEL_WORDS else ""].append(spec)
-    tables = {level: _rows(of_levels[level], unfolded) for level in (*LEVEL_WORDS, "") if level in of_levels}
-    widths = _widths([row for rows in tables.values() for row in rows])
-    for number, (level, rows) in enumerate(tables.items()):
-        heading = f"{level}: {LEVEL_WORDS[level]}" if level else "no valid level"
-        display.write_coloured(stdout, [("\n" * bool(number), ""), (heading, "place"), ("\n", "")])
-        _table(rows, widths, stdout, width, "  ")
-
-
 def _rows(specs: Sequence[Spec], unfolded: bool) -> list[tuple[str, ...]]:
+    """Level, name, kind and description of each test, by level; a matrix is one row unless ``unfolded``."""
     tests: dict[Path, list[Spec]] = defaultdict(list)
     for spec in specs:
         tests[spec.path].append(spec)
@@ -141,21 +125,16 @@ def _rows(specs: Sequence[Spec], unfolded: bool) -> list[tuple[str, ...]]:
         if others and not unfolded:
             dimensions = ", ".join(name for name, _ in (*spec.choice.values, *spec.choice.shown))
             about = f"{1 + len(others)} instances ({dimensions}): {spec.description or ''}"
-            rows.append((spec.title.removesuffix(spec.choice.label), spec.kind or "?", about))
+            rows.append((spec.level or "?", spec.title.removesuffix(spec.choice.label), spec.kind or "?", about))
         else:
-            rows += [(one.title, one.kind or "?", one.description or "") for one in (spec, *others)]
-    return rows
+            rows += [(s.level or "?", s.title, s.kind or "?", s.description or "") for s in (spec, *others)]
+    order = [*LEVELS, *(row[0] for row in rows)]
+    return sorted(rows, key=lambda row: order.index(row[0]))
 
 
-def _widths(rows: Sequence[tuple[str, ...]]) -> list[int]:
-    """Those of the widest cells of each column but the last."""
-    return [max(map(len, column)) for column in list(zip(*rows, strict=True))[:-1]]
-
-
-def _table(
-    rows: Sequence[tuple[str, ...]], widths: Sequence[int], stdout: TextIO, width: int | None, indent: str = ""
-) -> None:
-    """A line for each row, cut to ``width`` columns."""
+def _table(rows: Sequence[tuple[str, ...]], stdout: TextIO) -> None:
+    """A line for each row, all columns but the last as wide as their widest cells."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)][:-1]
     for row in rows:
         cells = [cell.ljust(size) for cell, size in zip(row, widths, strict=False)]
-        stdout.write(clipped(printable(indent + "  ".join([*cells, row[-1]])).rstrip(), width) + "\n")
+        stdout.write(printable("  ".join([*cells, row[-1]])).rstrip() + "\n")
