@@ -17,11 +17,6 @@ _MOST_GAPS = 4
 """Cells an outcome, of which a part is empty if not all instances ran."""
 
 
-def urgency(outcome: Outcome) -> int:
-    """0 for what is looked at first."""
-    return _URGENCIES.index(outcome.outcome)
-
-
 class Grid(NamedTuple):
     """Outcomes by parameters: those of ``names`` are the rows, ``column`` the columns, empty if there is but one."""
 
@@ -42,7 +37,8 @@ class Family:
 
     @property
     def urgency(self) -> int:
-        return min(map(urgency, self.outcomes))
+        """0 for what is looked at first."""
+        return min(_URGENCIES.index(outcome.outcome) for outcome in self.outcomes)
 
     def count(self, kind: str) -> int:
         """How many of its tests have an outcome."""

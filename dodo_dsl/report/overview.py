@@ -38,7 +38,6 @@ _INDENT = re.compile(r"\n +(?=<)")
 """Of tags: text of others has none, and a page with many tests has thousands."""
 _MOST_TEXT = 10_000
 """Characters of one text of others on the page."""
-_MOST_REPOSITORIES = 4
 _MOST_OF_A_LINE = 56
 """Characters of the reason of a test that passed, which has one line."""
 
@@ -52,7 +51,6 @@ def render(
 ) -> str:
     """The page, with files by slug; with a comparison, what changed since that report."""
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
-    repositories = {r.commit: r for run in circumstances.runs for r in run.repositories}
     page = (
         _environment()
         .get_template("report.html.j2")
@@ -64,7 +62,6 @@ def render(
             checks=checks,
             check_of=check_of,
             longest=_MOST_OF_A_LINE,
-            repositories=list(repositories.values())[:_MOST_REPOSITORIES],
             taken_s=sum((o.setup_s or 0.0) + (o.execution_s or 0.0) for o in outcomes),
             counts=counts,
             not_run=circumstances.not_run,

@@ -4,27 +4,9 @@
 dodo.checks = (function () {
   const { make, svg } = dodo.dom;
 
-  // The line with the parameters that set the limit marked in it.
-  function source(line, flags) {
-    const parts = flags.length ? line.split(new RegExp(`(?<![\\w-])(${flags.join("|")})(?![\\w-])`)) : [line];
-    return make("code", {}, ...parts.map((part) => (flags.includes(part) ? make("mark", {}, part) : part)));
-  }
-
-  function places(check) {
-    const lines = new Map();
-    for (const place of check.places) {
-      const key = `${place.file}:${place.line}`;
-      lines.set(key, { ...place, flags: [...(lines.get(key)?.flags || []), ...(place.flag ? [place.flag] : [])] });
-    }
-    return [...lines.values()].map((place) =>
-      make(
-        "p",
-        { class: "place", title: place.file },
-        `${place.file.split("/").pop()}:${place.line} `,
-        place.text ? source(place.text, place.flags) : null,
-        place.flag ? "" : " by default",
-      ),
-    );
+  function place({ file, line, text, isDefault }) {
+    const source = text ? make("code", {}, text) : null;
+    return make("p", { class: "place", title: file }, `${file.split("/").pop()}:${line} `, source, isDefault ? " by default" : "");
   }
 
   // From the nearest limit to the value, on the scale of the report's first page: 100 wide, values grow to the right.
@@ -40,7 +22,7 @@ dodo.checks = (function () {
     const state = check.ok ? "passed" : "failed";
     const measured = [check.value, check.limits.join(", ")].filter(Boolean).join(", expected ");
     const name = make("b", {}, `${check.ok ? "✓" : "✗"} ${check.name}`);
-    return make("li", { class: state }, make("span", {}, name, ` ${measured}`), check.bar ? bar(check.bar) : "", meaning, ...(check.ok ? [] : places(check)));
+    return make("li", { class: state }, make("span", {}, name, ` ${measured}`), check.bar ? bar(check.bar) : "", meaning, ...(check.ok ? [] : check.places.map(place)));
   }
 
   function show(parent) {

@@ -80,9 +80,9 @@ def checks(plan: Plan, outcome: Outcome, recorded: Parameters, roots: Sequence[P
                     "file": shown(place.file, 400),
                     "line": place.line,
                     "text": "".join(files[place.file][place.line - 1 : place.line]).strip(),
-                    "flag": flag,
+                    "isDefault": not flag,
                 }
-                for flag, place in places
+                for place, flag in {place: flag for flag, place in places}.items()
             ],
         }
 

@@ -23,26 +23,26 @@ def test_the_place_of_a_limit_of_memory() -> None:
     plan = replace(plan, source_map={**plan.source_map, "resources": RESOURCES})
     outcome = replace(OUTCOME, checks=(check("peak-memory-perception", 210.0, False, max=200),))
     (found,) = checks(plan, outcome, RECORDED, (ROOT,))
-    assert [(p["flag"], p["line"]) for p in found["places"]] == [("max-memory", 9)]
+    assert [(p["isDefault"], p["line"]) for p in found["places"]] == [(False, 9)]
 
 
 @pytest.mark.parametrize(
     ("slug", "name", "expected"),
     [
-        ("sil-open-straight", "distance", [("max-distance", 22, "max-distance: 0.06")]),
-        ("sil-open-straight", "mean-over-time", [("max-mean", 20, "max-mean: 0.014")]),
-        ("sil-open-straight", "gap", [("", 14, "signal:")]),
+        ("sil-open-straight", "distance", [(False, 22, "max-distance: 0.06")]),
+        ("sil-open-straight", "mean-over-time", [(False, 20, "max-mean: 0.014")]),
+        ("sil-open-straight", "gap", [(True, 14, "signal:")]),
         ("sil-open-straight", "unheard-of", []),
         ("sil-open-straight", "slow-answers", []),
-        ("dil-static-rig", "slow-answers", [("max", 10, RESPONSE)]),
-        ("dil-static-rig", "uncopied-sample-times", [("sample-times", 10, RESPONSE)]),
+        ("dil-static-rig", "slow-answers", [(False, 10, RESPONSE)]),
+        ("dil-static-rig", "uncopied-sample-times", [(False, 10, RESPONSE)]),
     ],
 )
-def test_places_of_limits(slug: str, name: str, expected: list[tuple[str, int, str]]) -> None:
+def test_places_of_limits(slug: str, name: str, expected: list[tuple[bool, int, str]]) -> None:
     plan = shipped(slug)
     outcome = replace(OUTCOME, checks=(check(name, 1.0, False, max=0.5),))
     (found,) = checks(plan, outcome, RECORDED, (ROOT,))
-    assert [(p["flag"], p["line"], p["text"]) for p in found["places"]] == expected
+    assert [(p["isDefault"], p["line"], p["text"]) for p in found["places"]] == expected
 
 
 def test_only_files_below_the_repository_are_read(tmp_path: Path) -> None:
