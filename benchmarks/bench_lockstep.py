@@ -1,12 +1,11 @@
 """The registry's tests in lockstep beside real time, with the example application.
 
-Prints test time over wall time of each (sim_s / execution_s, in real time about 1), where the wall time of a step went,
-and the whole suite's time; then how long one short test takes from command to end, and how many more of it a minute
-brings with two at once. In the ledger the test's own time stands for real time, and the tests are those with a goal.
+Prints test time over wall time of each (sim_s / execution_s, in real time about 1), and the whole suite's time; then
+how long one short test takes from command to end, and how many more of it a minute brings with two at once. In the
+ledger the test's own time stands for real time, and the tests are those with a goal.
 """
 
 import json
-import re
 import statistics
 import sys
 import tempfile
@@ -26,7 +25,6 @@ ROUNDS, REPEATS = 3, 10
 SHORT = "sil-closed-straight"
 GOALS = {SHORT: None, "sil-closed-kiwi-track": Goal(20), "sil-perception": Goal(8)}
 LEVELS = ("--level", "sil", "--level", "dil")
-_SPENT = re.compile(r"(?P<who>[^,]+?) (?P<seconds>\d+\.\d+) s")
 Tests = dict[str, dict[str, Any]]
 
 
@@ -38,15 +36,6 @@ def run(report: Path, *words: str) -> tuple[Tests, float]:
         raise RuntimeError(f"dodo run {' '.join(words)} ended with {code}")
     seconds = time.perf_counter() - start
     return {t["slug"]: t for t in json.loads((report / "results.json").read_text())["tests"]}, seconds
-
-
-def spent(report: Path, slug: str) -> str:
-    """For whom the clock waited, in ms a step, the longest first."""
-    log = (report / slug / "logs" / "environment.dodo-clock.log").read_text()
-    line = next(line for line in log.splitlines() if "waited for" in line)
-    frames = max(json.loads(line)["frames"] for line in log.splitlines() if line.startswith('{"dodo": "time"'))
-    parts = [(m["who"].strip(), float(m["seconds"])) for m in _SPENT.finditer(line.partition("waited for")[2])]
-    return ", ".join(f"{who} {seconds / frames * 1000:.1f}" for who, seconds in parts[:6])
 
 
 def speed_row(slug: str, ours: list[float], peer: str = "real time", theirs: Sequence[float] = ()) -> Row:
@@ -76,7 +65,6 @@ def speeds(folder: Path, budget: Budget) -> None:
         execution = statistics.median(t["execution_s"] for t in ours)
         ratio = f"{statistics.median(times):6.1f} {max(times):6.1f}"
         print(f"{slug:24s} {execution:7.2f} s {ours[0]['sim_s']:9.1f} s   {ratio}")
-        print(f"    ms a step: {spent(folder / '0', slug)}")
     print(f"all of them, one after the other: {statistics.median(seconds for _, seconds in rounds):.1f} s in lockstep")
 
 

@@ -4,7 +4,7 @@ from services.base.clock import Clock, RealTimeClock
 from services.base.evaluator import Evaluator, JudgedTime, UnjudgeableError
 from services.base.flags import Flags, FlagsError, Share
 from services.base.judged import Judged, JudgedBoxes, Series
-from services.base.process import run
+from services.base.process import main, run
 from services.base.service import Check, Context, Handler, Output, Service, UnusableMessageError, Verdict, period_of
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
     "UnjudgeableError",
     "UnusableMessageError",
     "Verdict",
+    "main",
     "period_of",
     "run",
 ]

@@ -6,11 +6,11 @@ import signal
 import stat
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from google.protobuf.message import Message
 
@@ -50,16 +50,15 @@ def _unknown_field(error: Exception) -> str:
 DONE, BROKEN, USAGE = 0, 1, 2
 
 
-def run(folder: Path, build: Build, argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
+def run(folder: Path, build: Build, clock: Clock | None = None) -> int:
     """A service from its command line to its exit code: 0 done or stopped by a signal, 1 broken, 2 wrong flags.
 
     ``folder`` holds the manifest; ``build`` raises ValueError or OSError for unusable flags.
     """
-    words = sys.argv[1:] if argv is None else argv
     manifest = load_manifest(folder)
     name = manifest["name"]
     try:
-        flags = parse(manifest, words)
+        flags = parse(manifest, sys.argv[1:])
     except FlagsError as error:
         sys.stderr.write(f"{name}: {error}\n")
         return USAGE
@@ -68,6 +67,11 @@ def run(folder: Path, build: Build, argv: Sequence[str] | None = None, clock: Cl
     role = os.environ.get("DODO_SERVICE") or name
     with _signals() as stop, connected(channel(), role):
         return _serve(role, manifest, folder, build, flags, clock, stop)
+
+
+def main(file: str, build: Build, clock: Clock | None = None) -> NoReturn:
+    """The program of the service whose ``__main__.py`` this file is."""
+    sys.exit(run(Path(file).parent, build, clock))
 
 
 IsStopped = Callable[[], bool]

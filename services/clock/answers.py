@@ -9,12 +9,19 @@ from typing import Any
 from dodo_dsl.opendlv.channel import Done, Show
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.numbers import is_whole, whole
-from services.clock.exchange import SLICE_S, ApplicationFloods, ApplicationSilent, Exchange, IsStopped, Patience
+from services.clock.exchange import (
+    PATIENCE,
+    SLICE_S,
+    WALL_FACTOR,
+    ApplicationFloods,
+    ApplicationSilent,
+    Exchange,
+    IsStopped,
+    Patience,
+)
 
 MOST_SURPLUS = 100
 """Surplus messages of one kind to a frame; more of them are a flood that would keep others from the bus."""
-WALL_FACTOR = 10.0
-"""How many times its patience an answer may take of wall time: others may have the processor."""
 
 
 @dataclass(frozen=True)
@@ -134,11 +141,9 @@ def filters(names: Iterable[str], ids: Mapping[str, int]) -> tuple[MessageFilter
 class AnsweringApplication:
     """Shows pictures to the application and waits for its answers; ``frames`` counts what was shown."""
 
-    def __init__(self, answers: Answers, patience: Patience, link: Exchange, stopped: IsStopped) -> None:
+    def __init__(self, answers: Answers, link: Exchange, stopped: IsStopped, patience: Patience = PATIENCE) -> None:
         self.answers = answers
         self.frames = 0
-        self.waited_first, self.waited = 0.0, 0.0
-        """Wall time in s for the first answer, and for all others."""
         self._patience, self._link, self._stopped = patience, link, stopped
         self._began = 0.0
         self._has_cameras = self._is_shown = False
@@ -193,9 +198,6 @@ class AnsweringApplication:
             if self._left <= 0:
                 raise ApplicationSilent(self._sentence(self._missing), silent=self.answers.is_silent)
             self._link.pump(self._left, self._reading)
-        spent = time.monotonic() - self._began
-        self.waited_first += spent if self.frames == 1 else 0.0
-        self.waited += spent if self.frames > 1 else 0.0
 
     def collect(self) -> list[Envelope]:
         return self.answers.collect()

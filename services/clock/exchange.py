@@ -4,8 +4,8 @@ import select
 import time
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
+from typing import NamedTuple
 
 from dodo_dsl.opendlv.address import LINES, Address
 from dodo_dsl.opendlv.address_book import RUNNER
@@ -154,18 +154,14 @@ class Roles:
         return (*self.advance, *self.sense, *self.judge, *self.watch)
 
 
-@dataclass
-class Patience:
+class Patience(NamedTuple):
     """Processor time in s that the application may compute without a wait, at its start and later."""
 
     first: float = 30.0
     others: float = 2.0
 
 
-@dataclass(frozen=True)
-class Timing:
-    """``period`` and ``timeout`` in us of test time; answers that take longer than ``max_response`` s count."""
+PATIENCE = Patience()
 
-    period: Fraction | int
-    timeout: int
-    max_response: float | None = None
+WALL_FACTOR = 10.0
+"""How many times its patience it may take of wall time: others may have the processor."""

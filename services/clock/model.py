@@ -1,7 +1,6 @@
 """The order of a step: the action layer advances, the environment senses, the application answers, evaluators judge."""
 
 import time
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -52,16 +51,9 @@ class Stepper:
     _next: dict[str, int] = field(default_factory=dict)
     _exact: Fraction = Fraction(EPOCH)
     _cameras: list[str] = field(default_factory=list)
-    _spent: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
 
     def __post_init__(self) -> None:
         self._backlog = {name: [] for name in self.roles.all}
-
-    @property
-    def spent(self) -> dict[str, float]:
-        """Wall time in s spent waiting, by participant."""
-        application = {"the first answer": self.application.waited_first, "the application": self.application.waited}
-        return {**self._spent, **application}
 
     def takers(self, data_type: int) -> list[str]:
         return [name for name in self.roles.all if data_type in self._consumed.get(name, ())]
@@ -153,7 +145,6 @@ class Stepper:
                     raise ServiceSilent(f"service '{name}' did not answer the clock within {patience:g} s")
             self._take(result)
             results.append(result)
-        self._spent[" and ".join(names)] += time.monotonic() - began
         return results
 
     def _take(self, result: Done) -> None:

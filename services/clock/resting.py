@@ -3,17 +3,20 @@
 import statistics
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl.opendlv.channel import Done, Show
 from dodo_dsl.opendlv.envelope import Envelope
+from services.base.runner import tell
 from services.clock.agent import Busy, Report, TimeAgent
 from services.clock.answers import MessageFilter
 from services.clock.exchange import (
+    PATIENCE,
     SLICE_S,
+    WALL_FACTOR,
     ApplicationFloods,
     ApplicationSilent,
     Exchange,
@@ -27,8 +30,6 @@ MOST_SENT = 1000
 """Messages of one kind in a step; more of them are a flood."""
 PATIENCE_S = 60.0
 """Wall time in s for an application that goes on without reaching the time, and for a camera."""
-WALL_FACTOR = 10.0
-"""How many times as long as it may compute a thread may take of wall time: others may have the processor."""
 EXPOSED_US = 1
 """How long after its sample time a picture is shown, so that the time of now is none of a picture."""
 GONE_S = 1.0
@@ -144,21 +145,19 @@ class RestingApplication:
         self,
         answers: SentMessages,
         agent: TimeAgent,
-        patience: Patience,
         link: Exchange,
         stopped: IsStopped,
         response: ResponseTimes,
         names: Sequence[str] = (),
-        note: Callable[[str], None] = lambda _: None,
+        lines: PrintedLines | None = None,
+        patience: Patience = PATIENCE,
     ) -> None:
+        """``names`` are those of its services; its ``lines`` are messages."""
         self.answers, self.response = answers, response
         self.frames = 0
-        self.waited_first, self.waited = 0.0, 0.0
-        """Wall time in s up to the second step, and since."""
         self._agent, self._patience, self._link, self._stopped = agent, patience, link, stopped
-        self._names, self._note = names, note
+        self._names, self._lines = names, lines
         self._noted: set[str] = set()
-        self.lines: PrintedLines | None = None
         self._unread: set[str] = set()
         """Cameras whose pictures nobody has waited for yet."""
         self._held: list[str] = []
@@ -249,9 +248,6 @@ class RestingApplication:
                     f"the application did not come to {(until - self._shown_at) / 1e6:g} s "
                     f"of its own time within {time.monotonic() - began:.0f} s of wall time"
                 )
-        spent = time.monotonic() - began
-        self.waited_first += spent if self.frames <= 1 else 0.0
-        self.waited += spent if self.frames > 1 else 0.0
 
     def _has_reached(self, report: Report, until: int, began: float) -> bool:
         """Whether it rests at this time; raises ApplicationSilent and ServiceSilent."""
@@ -281,7 +277,7 @@ class RestingApplication:
     def _has_lines(self, until: int) -> bool:
         """Whether all that it has printed in this step is taken, and it still rests."""
         is_shown_next = self.frames > 0 and until in (self._shown_at, self._shown_at + EXPOSED_US)
-        return is_shown_next or self.lines is None or self.lines.are_complete(self._shown_at, self._link)
+        return is_shown_next or self._lines is None or self._lines.are_complete(self._shown_at, self._link)
 
     @property
     def _limit(self) -> float:
@@ -324,7 +320,7 @@ class RestingApplication:
     def _note_once(self, text: str) -> None:
         if text not in self._noted and len(self._noted) < _MOST_NOTES:
             self._noted.add(text)
-            self._note(text)
+            tell("note", text=text)
 
 
 def _printable(text: str) -> str:

@@ -1,24 +1,22 @@
 """The clock on the bus: it waits for the test's begin, steps it to its end, and reports its progress to the runner."""
 
-import logging
 import os
 import time
 from collections.abc import Callable
 from contextlib import closing, suppress
 from pathlib import Path
-from typing import NamedTuple
 
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageError
-from dodo_dsl.opendlv.session import Session
+from services.base import Context, Service, period_of
 from services.base.clock import MICROSECONDS
+from services.base.clock_link import socket_path
 from services.base.lockstep_clock import EPOCH
 from services.base.members import SenderTable
 from services.base.runner import tell
-from services.base.service import Service
 from services.clock.agent import TimeAgent
-from services.clock.answers import AnsweringApplication, Answers
-from services.clock.exchange import Exchange, Patience, Roles, TestEnded, Timing
+from services.clock.answers import AnsweringApplication, Answers, filters
+from services.clock.exchange import Exchange, Roles, ServiceSilent, TestEnded
 from services.clock.model import Stepper
 from services.clock.printed_lines import PrintedLines
 from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
@@ -28,50 +26,42 @@ _REPORT_S = 0.1
 _SLICE = 0.05
 BEGIN = "dodo.TestBegin"
 
-_log = logging.getLogger(__name__)
-
-
-class OwnTime(NamedTuple):
-    """What lets the time of the application go on, and the ``names`` of its services."""
-
-    agent: TimeAgent
-    names: tuple[str, ...]
-
 
 class ClockService(Service):
-    def __init__(
-        self,
-        session: Session,
-        path: Path,
-        roles: Roles,
-        answers: Answers | SentMessages,
-        timing: Timing,
-        senders: SenderTable | None = None,
-        own_time: OwnTime | None = None,
-        *,
-        prints: bool = False,
-    ) -> None:
-        """Services connect at ``path``. With ``own_time`` the application rests; ``prints``: it prints messages."""
-        self._session = session
-        self._begin_id = session.messages.id(BEGIN)
-        self._senders = senders or SenderTable(session.messages)
-        self._answers = answers
-        self._lines = PrintedLines(session, self._over) if prints else None
-        self._exchange = exchange = Exchange(session, path, roles.all, self._take, self._senders)
-        self._application: AnsweringApplication | RestingApplication
-        if isinstance(answers, SentMessages):
-            assert own_time is not None, "the program gives it"
-            response = ResponseTimes(float(timing.period) / MICROSECONDS, timing.max_response)
-            self._application = RestingApplication(
-                answers, own_time.agent, Patience(), exchange, self._over, response, own_time.names, self._note
-            )
-            self._application.lines = self._lines
-        else:
-            self._application = AnsweringApplication(answers, Patience(), exchange, self._over)
-        self._stepper = Stepper(roles, timing.period, timing.timeout, self._application, exchange, self._over)
+    """Takes messages as they come, as long as ``drive`` runs. Services connect at ``socket_path``."""
+
+    def __init__(self, context: Context) -> None:
+        """Raises ValueError for messages that are none, and OSError."""
+        assert context.session is not None, "the program gives its session"
+        self._session, flags = context.session, context.flags
+        self._begin_id = self._session.messages.id(BEGIN)
+        self._senders = SenderTable.load(context.messages)
+        self._lines = PrintedLines(self._session, self._over) if flags["prints"] else None
+        roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
+        self._exchange = Exchange(self._session, socket_path(), roles.all, self._take, self._senders)
+        self._application = self._application_of(context)
+        self._answers: Answers | SentMessages = self._application.answers
+        self._session.hear_only([*(each.data_type for each in self._answers.filters), *self._senders.ids])
+        period, timeout = period_of(flags["freq"]), round(flags["timeout"] * MICROSECONDS)
+        self._stepper = Stepper(roles, period, timeout, self._application, self._exchange, self._over)
         self._reported = self._begun = 0.0
         self._stopped: Callable[[], bool] = lambda: False
         self.drive = self._drive
+
+    def _application_of(self, context: Context) -> AnsweringApplication | RestingApplication:
+        """The application, which rests where something lets its time go on, and else answers."""
+        flags, ids = context.flags, {name: context.messages.id(name) for name in context.messages.names()}
+        done = filters([flags["done"]] if flags["done"] else [], ids)
+        answers = Answers(filters(flags["answers"], ids), filters(flags["hears"], ids), done[0] if done else None)
+        if not flags["time-folder"] or os.environ.get("DODO_ANSWERS"):
+            return AnsweringApplication(answers, self._exchange, self._over)
+        agent = TimeAgent(Path(flags["time-folder"]))
+        context.resources.callback(agent.close)
+        with suppress(ServiceSilent):  # the first step says so; it is opened before an application could find it
+            agent.open(lambda: False)
+        response = ResponseTimes(1 / flags["freq"], flags["max-response"])
+        sent, names = SentMessages(answers.filters), flags["application"]
+        return RestingApplication(sent, agent, self._exchange, self._over, response, names, self._lines)
 
     def _drive(self, stopped: Callable[[], bool]) -> None:
         self._stopped = stopped
@@ -89,8 +79,6 @@ class ClockService(Service):
             self._stepper.run(begin)
         except TestEnded as problem:
             ended = problem
-        spent = sorted(((n, s) for n, s in self._stepper.spent.items() if n), key=lambda item: -item[1])
-        _log.info("waited for %s", ", ".join(f"{name} {seconds:.3f} s" for name, seconds in spent))
         if facts := self._application.facts():
             tell("response", response=facts)
         if self._begun:
@@ -135,5 +123,5 @@ class ClockService(Service):
         self._reported = time.monotonic()
         tell("time", seconds=(self._stepper.reached - EPOCH) / 1e6, last=last)
 
-    def _note(self, text: str) -> None:
-        tell("note", text=text)
+
+build = ClockService

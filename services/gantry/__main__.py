@@ -1,8 +1,5 @@
-import sys
-from pathlib import Path
-
-from services.base import run
+from services.base import main
 from services.gantry.service import build
 
 if __name__ == "__main__":
-    sys.exit(run(Path(__file__).parent, build))
+    main(__file__, build)

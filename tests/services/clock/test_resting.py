@@ -85,16 +85,12 @@ def steering(sent: int, sampled: int = 5, stamp: int = 0) -> Envelope:
     return Envelope(IDS[STEER], b"", sent, 1, sampled, stamp)
 
 
-def application(agent: TimeAgent, sent: SentMessages | None = None, link: object = None) -> RestingApplication:
-    heard = sent or SentMessages(filters([STEER], IDS))
-    patience = Patience(0.4, 0.2)
-    notes: list[str] = []
-    known = cast(Exchange, link or Link())
-    made = RestingApplication(
-        heard, agent, patience, known, lambda: False, ResponseTimes(), ("driver", "eye"), notes.append
-    )
-    made.notes = notes  # type: ignore[attr-defined]
-    return made
+def application(
+    agent: TimeAgent, sent: SentMessages | None = None, link: object = None, lines: object = None
+) -> RestingApplication:
+    heard, known = sent or SentMessages(filters([STEER], IDS)), cast(Exchange, link or Link())
+    names, printed, patience = ("driver", "eye"), cast(PrintedLines, lines), Patience(0.4, 0.2)
+    return RestingApplication(heard, agent, known, lambda: False, ResponseTimes(), names, printed, patience)
 
 
 def test_messages_count_when_they_were_sent_and_no_later_than_now(tmp_path: Path) -> None:
@@ -180,8 +176,7 @@ def test_its_lines_are_of_the_test_from_the_start_on(tmp_path: Path) -> None:
         return True
 
     with agent(tmp_path) as time:
-        driven = application(time)
-        driven.lines = cast(PrintedLines, SimpleNamespace(are_complete=are_complete))
+        driven = application(time, lines=SimpleNamespace(are_complete=are_complete))
         driven.start(EPOCH, ())
         assert asked == [EPOCH]
         driven.show((), EPOCH)

@@ -2,36 +2,43 @@
 
 import json
 import math
-import tempfile
-from fractions import Fraction
 from pathlib import Path
+from typing import cast
 
 import pytest
 
 from dodo_dsl.opendlv import address_book
-from dodo_dsl.opendlv.address import LINES
+from dodo_dsl.opendlv.address import CHANNEL_VARIABLE, LINES
 from dodo_dsl.opendlv.address_book import AddressBook
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
+from services.base import Context
+from services.base.flags import load_manifest, parse
 from services.base.members import Producers, SenderTable
 from services.clock import model
-from services.clock.answers import Answers, MessageFilter
-from services.clock.exchange import Exchange, Roles, Timing
+from services.clock.answers import Answers
+from services.clock.exchange import Exchange
 from services.clock.service import ClockService
+from tests.services.process import ROOT
 
-STEP = Fraction(100_000)
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the services of the test meet."""
+    monkeypatch.setenv(CHANNEL_VARIABLE, str(tmp_path))
+    return tmp_path
 
 
-def driven(session: Session, roles: Roles, stopped: bool = False, runner: Session | None = None) -> None:
-    with tempfile.TemporaryDirectory() as folder:
-        timing = Timing(STEP, 1_000_000)
-        senders = SenderTable(session.messages, {}, AddressBook(Path(folder)))
-        if runner:
-            address_book.enter(Path(folder), "dodo-runner", runner.address)
-        service = ClockService(session, Path(folder, ".clock"), roles, Answers(()), timing, senders)
-        assert service.drive is not None
-        service.drive(lambda: stopped)
+def clock(session: Session, *flags: str) -> ClockService:
+    known = parse(load_manifest(ROOT / "services" / "clock"), ["--cid=1", "--timeout=1", *flags])
+    return ClockService(Context("clock", known, session.messages, session=session))
+
+
+def driven(session: Session, *flags: str, stopped: bool = False) -> None:
+    service = clock(session, *flags)
+    assert service.drive is not None
+    service.drive(lambda: stopped)
 
 
 def test_a_service_that_does_not_answer_is_reported(
@@ -40,7 +47,7 @@ def test_a_service_that_does_not_answer_is_reported(
     monkeypatch.setattr(model, "SERVICE_PATIENCE", 0.1)
     reason = "service 'gone' did not answer the clock within 0.4 s"
     with Session(cid) as session:
-        driven(session, Roles((), (), ("gone",)))
+        driven(session, "--judge=gone")
     assert [json.loads(line) for line in capsys.readouterr().out.splitlines()] == [
         {"dodo": "stopped", "how": "stuck", "reason": reason, "silent": False},
     ]
@@ -48,7 +55,7 @@ def test_a_service_that_does_not_answer_is_reported(
 
 def test_who_is_stopped_before_the_begin_reports_no_time(cid: int, capsys: pytest.CaptureFixture[str]) -> None:
     with Session(cid) as session:
-        driven(session, Roles((), (), ()), stopped=True)
+        driven(session, stopped=True)
     assert "time" not in capsys.readouterr().out
 
 
@@ -59,18 +66,21 @@ def test_without_a_runner_it_begins_by_itself(
     """As with ``docker compose up`` on a compiled test."""
     monkeypatch.setenv("DODO_RUNNER", "")
     with Session(cid) as session:
-        driven(session, Roles((), (), ()))
+        driven(session)
     assert [json.loads(line)["dodo"] for line in capsys.readouterr().out.splitlines()] == ["time", "time"]
 
 
 @pytest.mark.thorough
-def test_the_begin_comes_to_its_own_address_and_nothing_else_does(cid: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_begin_comes_to_its_own_address_and_nothing_else_does(
+    cid: int, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """An application must not answer where only the clock hears it; it waits for the runner."""
     with Session(cid) as session, Session(cid) as other:
         session.hear_directly()
         other.send_directly(enveloped("opendlv.proxy.GroundSteeringRequest"), [session.address])
         other.send_directly(enveloped("dodo.TestBegin"), [session.address])
-        driven(session, Roles((), (), ()), runner=other)
+        address_book.enter(folder, "dodo-runner", other.address)
+        driven(session)
         assert not session.hears_directly
     told = [json.loads(line)["dodo"] for line in capsys.readouterr().out.splitlines()]
     assert told == ["started", "time", "time"]
@@ -81,7 +91,7 @@ def enveloped(name: str) -> Envelope:
     return Envelope(messages.id(name), messages.encode(messages.type(name)()), 0, 0, 0, 0)
 
 
-STEERING = "opendlv.proxy.GroundSteeringRequest"
+STEERING, PEDAL = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"
 
 
 def test_an_answer_that_is_printed_comes_from_the_runner_alone(
@@ -108,23 +118,22 @@ def test_an_answer_that_is_printed_comes_from_the_runner_alone(
 
 
 def test_a_number_of_the_application_that_is_not_finite_is_reported_once(
-    cid: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    cid: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Of what services take, and of no other message or sender stamp; the answer counts as before."""
     with Session(cid) as session:
-        steering, pedal = (session.messages.id(name) for name in (STEERING, "opendlv.proxy.PedalPositionRequest"))
-        answers = Answers((MessageFilter(STEERING, steering, 0),), (MessageFilter("pedal", pedal),))
-        roles = Roles(("vehicle",), (), ("track",))
-        clock = ClockService(session, tmp_path / "clock", roles, answers, Timing(STEP, 1))
-        clock._exchange.close()
-        clock._stepper._consumed = {"track": frozenset({steering}), "vehicle": frozenset({steering})}
-        clock._stepper.now += 700_000
+        steering, pedal = (session.messages.id(name) for name in (STEERING, PEDAL))
+        it = clock(session, f"--answers={STEERING}/0", f"--hears={PEDAL}", "--advance=vehicle", "--judge=track")
+        it._exchange.close()
+        it._stepper._consumed = {"track": frozenset({steering}), "vehicle": frozenset({steering})}
+        it._stepper.now += 700_000
+        answers = cast(Answers, it._answers)
         answers.expect([5])
         sent = [(steering, math.nan, 7), (pedal, math.nan, 0), *[(steering, -math.inf, 0)] * 2]
         for id_, value, stamp in sent:
             message = session.messages.type(session.messages.name(id_))()
             setattr(message, message.DESCRIPTOR.fields[0].name, value)
-            clock._take(Envelope(id_, session.messages.encode(message), 5, 0, 5, stamp))
+            it._take(Envelope(id_, session.messages.encode(message), 5, 0, 5, stamp))
         assert answers.missing == []
     assert [json.loads(line)["reason"] for line in capsys.readouterr().out.splitlines()] == [
         f"the application sent {STEERING}/0 to 'vehicle' and 'track' after 0.70 s: "

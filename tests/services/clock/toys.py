@@ -242,8 +242,8 @@ class Toys:
 
     def _under_test(self, answers: Any, link: Exchange, stopped: IsStopped) -> Any:
         if self.agent:
-            return RestingApplication(answers, self.agent, self.patience, link, stopped, ResponseTimes(), ("toy",))
-        return AnsweringApplication(answers, self.patience, link, stopped)
+            return RestingApplication(answers, self.agent, link, stopped, ResponseTimes(), ("toy",))
+        return AnsweringApplication(answers, link, stopped, self.patience)
 
     @contextmanager
     def _services(self, stop: threading.Event, makers: dict[str, Maker], path: Path) -> Iterator[None]:
