@@ -1,4 +1,4 @@
-"""The share of an area that a vehicle has passed over, on a grid of square cells, and the verdict on it.
+"""The share of an area that a vehicle has passed over, on a grid of square cells.
 
 A cell counts with its centre. Metres and rad, world frame.
 """
@@ -6,14 +6,12 @@ A cell counts with its centre. Metres and rad, world frame.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.assets.track import VehiclePose, between
-from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
 
 MOST_CELLS = 4_000_000
 _STEPS = 100_000
@@ -97,64 +95,3 @@ class CoverageGrid:
         steps = min(_STEPS, max(1, math.ceil(2 * way / min(self._cell, self._footprint.thickness))))
         for step in range(1, steps + 1):
             self.cover(between(start, end, step / steps))
-
-
-class CoverageEvaluator(Evaluator):
-    """Judges the vehicle's poses in test time; ``name`` is the area's, ``least`` the share of it to cover."""
-
-    period = 10_000
-
-    def __init__(self, name: str, grid: CoverageGrid, least: float, max_time: float) -> None:
-        super().__init__(max_time)
-        self._name, self._grid, self._least, self._limit = name, grid, least, max_time
-        self._last: tuple[int, VehiclePose] | None = None
-        self._distance, self._reached = 0.0, None
-        self.plot = self.judged.series(f"Share of {name} passed over", low=least)
-
-    _reached: float | None
-
-    def look(self, pose: VehiclePose, time: int) -> None:
-        """The vehicle is at a pose; one that is not newer than the last, or of before the test, is ignored."""
-        before = self._last
-        if self.verdict is not None or (before is not None and time <= before[0]):
-            return
-        self._last = time, pose
-        if self.elapsed(time) < 0:
-            return
-        if self.is_overdue(time):
-            self.time_is_over()
-            return
-        if before is None or self.elapsed(before[0]) < 0:
-            self._grid.cover(pose)
-        else:
-            self._grid.move(before[1], pose)
-            self._distance += math.hypot(pose.x - before[1].x, pose.y - before[1].y)
-        self.plot.add(time, self._grid.share, mark=0)
-        if self._grid.share >= self._least:
-            self._reached = self.elapsed(time)
-            self.verdict = self._verdict("passed", f"passed over {self._said} after {self._reached:.2f} s")
-
-    @property
-    def _said(self) -> str:
-        return f"{self._grid.share * 100:.4g} % of {self._name}"
-
-    def decide(self, span: JudgedTime) -> Verdict:
-        if self._last is None:
-            raise UnjudgeableError(f"no opendlv.sim.Frame of the vehicle came {span.within}")
-        pose = self._last[1]
-        where = f"the vehicle is at x = {pose.x:z.2f} m, y = {pose.y:z.2f} m"
-        reason = f"passed over {self._said} {span.within}, expected at least {self._least * 100:.4g} %; {where}"
-        return self._verdict("failed", reason)
-
-    def checks(self) -> tuple[Check, ...]:
-        covered, reached = self._grid.share, self._reached
-        return (
-            Check.least("covered", covered, self._least, parameters=("min-share",)),
-            Check.most("time-to-cover", reached, self._limit, "s", ("max-time",)),
-            Check("distance", self._distance, {}, "m"),
-        )
-
-    def _verdict(self, outcome: Literal["passed", "failed"], reason: str) -> Verdict:
-        time, pose = self._last or (self.zero, VehiclePose(0, 0, 0))
-        evidence = {"time": self.elapsed(time), "x": pose.x, "y": pose.y}
-        return Verdict(outcome, reason, self.checks(), evidence=evidence)

@@ -1,32 +1,81 @@
 """The evaluator of an area that has to be passed over, on the bus."""
 
+import math
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import shapely
 
 from dodo_dsl.opendlv.assets import map_file
-from services.base import Context, Flags
+from dodo_dsl.opendlv.assets.track import VehiclePose
+from services.base import Check, Context, Evaluator, Flags, JudgedTime, UnjudgeableError, Verdict
 from services.base.vehicle_pose import vehicle_pose
-from services.coverage.model import CoverageEvaluator, CoverageGrid, Footprint, enclosed
+from services.coverage.model import CoverageGrid, Footprint, enclosed
 
 _SIDES = ("x-min", "x-max", "y-min", "y-max")
 
 
-class Coverage(CoverageEvaluator):
+class Coverage(Evaluator):
     """Takes the vehicle's frames under the sender stamp ``frame-id``."""
+
+    period = 10_000
 
     def __init__(self, context: Context) -> None:
         """Raises ValueError for flags that leave something open."""
-        flags = context.flags
+        self._flags = flags = context.flags
+        super().__init__(flags["max-time"])
         diameter = flags["diameter"]
         footprint = Footprint(diameter, 0.0) if diameter else Footprint(flags["length"], flags["width"])
-        grid = CoverageGrid(_area(flags), flags["cell"], footprint)
-        super().__init__(flags["area"] or "the rectangle", grid, flags["min-share"], flags["max-time"])
+        self._name, self._grid = flags["area"] or "the rectangle", CoverageGrid(_area(flags), flags["cell"], footprint)
+        self._last: tuple[int, VehiclePose] | None = None
+        self._distance = 0.0
+        self._reached: float | None = None
+        self.plot = self.judged.series(f"Share of {self._name} passed over", low=flags["min-share"])
         self.inputs = {("opendlv.sim.Frame", flags["frame-id"]): self._take_frame}
 
-    def _take_frame(self, frame: Any, sample_time: int) -> None:
-        self.look(vehicle_pose(frame), sample_time)
+    def _take_frame(self, frame: Any, time: int) -> None:
+        """A frame that is not newer than the last, or of before the test, is ignored."""
+        pose, before = vehicle_pose(frame), self._last
+        if self.verdict is not None or (before is not None and time <= before[0]):
+            return
+        self._last = time, pose
+        if self.elapsed(time) < 0:
+            return
+        if self.is_overdue(time):
+            self.time_is_over()
+            return
+        if before is None or self.elapsed(before[0]) < 0:
+            self._grid.cover(pose)
+        else:
+            self._grid.move(before[1], pose)
+            self._distance += math.hypot(pose.x - before[1].x, pose.y - before[1].y)
+        self.plot.add(time, self._grid.share, mark=0)
+        if self._grid.share >= self._flags["min-share"]:
+            self._reached = self.elapsed(time)
+            self.verdict = self._verdict("passed", f"passed over {self._said} after {self._reached:.2f} s")
+
+    @property
+    def _said(self) -> str:
+        return f"{self._grid.share * 100:.4g} % of {self._name}"
+
+    def decide(self, span: JudgedTime) -> Verdict:
+        if self._last is None:
+            raise UnjudgeableError(f"no opendlv.sim.Frame of the vehicle came {span.within}")
+        pose, least = self._last[1], self._flags["min-share"] * 100
+        where = f"the vehicle is at x = {pose.x:z.2f} m, y = {pose.y:z.2f} m"
+        return self._verdict(
+            "failed", f"passed over {self._said} {span.within}, expected at least {least:.4g} %; {where}"
+        )
+
+    def _verdict(self, outcome: Literal["passed", "failed"], reason: str) -> Verdict:
+        time, pose = self._last or (self.zero, VehiclePose(0, 0, 0))
+        checks = (
+            Check.least("covered", self._grid.share, self._flags["min-share"], parameters=("min-share",)),
+            Check.most("time-to-cover", self._reached, self._flags["max-time"], "s", ("max-time",)),
+            Check("distance", self._distance, {}, "m"),
+        )
+        evidence = {"time": self.elapsed(time), "x": pose.x, "y": pose.y}
+        return Verdict(outcome, reason, checks, evidence=evidence)
 
 
 build = Coverage
