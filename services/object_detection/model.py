@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from operator import attrgetter
 
-from services.base import Check, Evaluator, JudgedBoxes, JudgedTime, UnjudgeableError, Verdict
+from services.base import Check, Evaluator, Flags, JudgedBoxes, JudgedTime, UnjudgeableError, Verdict
 from services.base.clock import MICROSECONDS
 from services.base.evaluator import EARLY
 from services.object_detection.boxes import Box, DetectedFrame, Detections, FrameKey, LabelledBox, Truth, Value
@@ -16,9 +16,7 @@ from services.object_detection.score import (
     MEASURES,
     SMALL,
     CountsByClass,
-    DetectionLimits,
     JudgedFrame,
-    Rules,
     Score,
     Silence,
     areas,
@@ -26,9 +24,9 @@ from services.object_detection.score import (
 )
 
 
-def verdict(score: Score, limits: DetectionLimits, during: str) -> Verdict:
+def verdict(score: Score, flags: Flags, during: str) -> Verdict:
     """Passed when every limit is kept; ``during`` is the observed time in words."""
-    checks = score.checks(limits)
+    checks = score.checks(flags)
     if not score.answered:
         return Verdict("failed", _silence(score, during), checks)
     broken = [check for check in checks if not check.ok]
@@ -142,10 +140,10 @@ class DetectionEvaluator(Evaluator):
     for its sample time.
     """
 
-    def __init__(self, truth: Truth | None, rules: Rules, limits: DetectionLimits) -> None:
-        super().__init__(rules.max_time, rules.max_delay)
-        self._truth, self._rules, self._limits = truth, rules, limits
-        self._score, self._silence = Score(), Silence(rules.start_up)
+    def __init__(self, truth: Truth | None, flags: Flags) -> None:
+        super().__init__(flags["max-time"], flags["max-delay"])
+        self._truth, self._flags = truth, flags
+        self._score, self._silence = Score(), Silence(flags["start-up"])
         self._frames: dict[int, DetectedFrame] = {}
         self._judged: set[int] = set()
         self._passed_over: set[int] = set()
@@ -155,7 +153,7 @@ class DetectionEvaluator(Evaluator):
 
     def forget(self, now: int) -> None:
         self.now = max(now, self.now or 0)
-        self._score, self._silence = Score(), Silence(self._rules.start_up)
+        self._score, self._silence = Score(), Silence(self._flags["start-up"])
         self._passed_over |= self._judged
         self._judged.clear()
         for frame in self._frames.values():
@@ -185,7 +183,7 @@ class DetectionEvaluator(Evaluator):
             self._settle(lambda frame: True)
 
     def advance(self, now: int) -> None:
-        patience = max(self._rules.max_delay * MICROSECONDS, 1)
+        patience = max(self._flags["max-delay"] * MICROSECONDS, 1)
         self._settle(lambda frame: now - frame.since >= patience)
 
     def decide(self, span: JudgedTime) -> Verdict:
@@ -200,14 +198,14 @@ class DetectionEvaluator(Evaluator):
         for key in sorted(self._pictures if self._truth and self._truth.frames != "one" else ()):
             is_shown = not (self._truth and self._truth.frames == "sample-time" and self.hidden_samples.hides(key))
             if self._truth and is_shown and (span.is_complete or key < self._last):
-                counts = compare((), self._truth.pictures[key], self._rules.iou, self._rules.labels)
+                counts = compare((), self._truth.pictures[key], self._flags["iou"], self._flags["classes"])
                 self._count(counts, JudgedFrame(key, f"of picture {key}", None), {"picture": key})
         if self._truth is None or span.is_complete:
             self._require_truth(span.within)
         end = self.elapsed(self.now if self._ended is None else self._ended) if self.now is not None else 0.0
         self._score.unanswered = self._silence.unanswered()
-        self._score.gap = self._silence.gap(self._rules.start, min(end, self._max_time), self._hidden)
-        return replace(verdict(self._score, self._limits, span.within), evidence=self._score.evidence())
+        self._score.gap = self._silence.gap(self._flags["from"], min(end, self._max_time), self._hidden)
+        return replace(verdict(self._score, self._flags, span.within), evidence=self._score.evidence())
 
     def _require_truth(self, within: str) -> None:
         """Raises UnjudgeableError when there was nothing to find in any frame, or nothing of a class that counts."""
@@ -215,7 +213,7 @@ class DetectionEvaluator(Evaluator):
             return
         counts = dict(self._score.counts)
         there = {label for label, each in counts.items() if each.hits + each.missed}
-        missing = [label for label in self._rules.labels if label not in there]
+        missing = [label for label in self._flags["classes"] if label not in there]
         if missing and self._truth is None:
             raise UnjudgeableError(f"no true box of class '{missing[0]}' came {within}")
         if not there:
@@ -255,7 +253,7 @@ class DetectionEvaluator(Evaluator):
         frame = self._frames.get(key.time)
         if frame is not None or key.time in self._judged or key.time in self._passed_over:
             return frame
-        if self.now is None or self.elapsed(self.now) < self._rules.start:
+        if self.now is None or self.elapsed(self.now) < self._flags["from"]:
             self._pass_over(key)
             return None
         ahead = key.time - self.now  # in lockstep a frame of the step that begins comes before its time
@@ -279,10 +277,10 @@ class DetectionEvaluator(Evaluator):
         self._score.repeated += frame.found.repeated
         if true is None:
             self._score.without_truth += 1
-            shown = [each for each in found if not self._rules.labels or each.label in self._rules.labels]
+            shown = [each for each in found if not self._flags["classes"] or each.label in self._flags["classes"]]
             self.judged.frame(sampled, JudgedBoxes((), areas(shown), (), is_known=False))
             return
-        counts = compare(found, true, self._rules.iou, self._rules.labels)
+        counts = compare(found, true, self._flags["iou"], self._flags["classes"])
         self.judged.frame(sampled, counts.boxes)
         order = frame.key.number if self._truth and self._truth.frames == "number" else frame.key.time
         time = self._time(frame)

@@ -10,7 +10,7 @@ from itertools import groupby, pairwise
 from types import MappingProxyType
 from typing import NamedTuple
 
-from services.base import Check, JudgedBoxes
+from services.base import Check, Flags, JudgedBoxes
 from services.base.judged import LabelledArea, ScoredArea
 from services.object_detection.boxes import LabelledBox, best_pairs, overlaps
 
@@ -215,42 +215,6 @@ MOST_CLASSES = 20
 """So many classes that only the application names have checks: the runner reads lines of 64 KiB."""
 
 
-@dataclass(frozen=True)
-class Rules:
-    """How frames are judged: overlap needed, classes that count (all when empty), and times in seconds.
-
-    Frames from before ``start`` do not count. A frame is judged ``max_delay`` after its first message. The first
-    answer may come within ``start_up``.
-    """
-
-    iou: float
-    labels: Collection[str]
-    max_delay: float
-    max_time: float
-    start: float = 0.0
-    start_up: float = 0.0
-
-
-@dataclass(frozen=True)
-class DetectionLimits:
-    """The least required values, None for no limit; ``each_class`` applies them to every class, too.
-
-    At most a share of ``unanswered`` frames, and ``gap`` s without an answer; None for no limit.
-    """
-
-    precision: float | None = None
-    recall: float | None = None
-    f1: float | None = None
-    frames: int = 1
-    each_class: bool = False
-    unanswered: float | None = None
-    gap: float | None = None
-
-    def of(self, measure: str) -> float | None:
-        limit: float | None = getattr(self, measure)
-        return limit
-
-
 class WorstFrame(NamedTuple):
     """The frame with the most mistakes, where it was, and what was wrong; ``key`` identifies it in the evidence."""
 
@@ -303,7 +267,7 @@ class Score:
             **({"gap-begin": gap.begin, "gap-end": gap.end} if gap else {}),
         }
 
-    def checks(self, limits: DetectionLimits) -> tuple[Check, ...]:
+    def checks(self, flags: Flags) -> tuple[Check, ...]:
         """Totals, what was counted, and a line of measures for each class; a measure without a value keeps no limit."""
         total = self.counts.total()
         counts = {
@@ -313,24 +277,24 @@ class Score:
             "mean-iou": total.mean_overlap,
             "frames": self.frames,
         }
-        gap = Check.most("gap", self.gap.length if self.gap else None, limits.gap, "s")
-        silent = Check.most("unanswered", self.unanswered.share, limits.unanswered)
+        gap = Check.most("gap", self.gap.length if self.gap else None, flags["max-gap"], "s")
+        silent = Check.most("unanswered", self.unanswered.share, flags["max-unanswered"])
         left_out = {"without-truth": self.without_truth, "late": self.late, "repeated": self.repeated}
         return (
-            *(Check.least(name, getattr(total, name), limits.of(name)) for name in MEASURES),
+            *(Check.least(name, getattr(total, name), flags[f"min-{name}"]) for name in MEASURES),
             *(Check(name, value) for name, value in counts.items()),
-            Check.least("answered", self.answered, limits.frames, parameters=("min-frames",)),
+            Check.least("answered", self.answered, flags["min-frames"], parameters=("min-frames",)),
             silent if self.unanswered.frames else replace(silent, ok=True),  # no answer was expected
             gap if self.gap else replace(gap, ok=True),
             *(Check(name, value) for name, value in left_out.items()),
-            *self._classes(limits),
+            *self._classes(flags),
         )
 
-    def _classes(self, limits: DetectionLimits) -> Iterator[Check]:
+    def _classes(self, flags: Flags) -> Iterator[Check]:
         made_up = [label for label, counts in self.counts if not counts.hits + counts.missed]
         for label, counts in self.counts:
             for name in MEASURES if label not in made_up[MOST_CLASSES:] else ():
-                limit = limits.of(name) if limits.each_class else None
+                limit = flags[f"min-{name}"] if flags["each-class"] else None
                 yield Check.least(
                     f"{name}-{label or 'unnamed'}", getattr(counts, name), limit, parameters=(f"min-{name}",)
                 )

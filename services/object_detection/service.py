@@ -8,7 +8,6 @@ from dodo_dsl.opendlv.assets.truth_file import no_box
 from services.base import Context, Flags, Handler
 from services.object_detection.boxes import Box, FrameKey, Truth, TypeNumber, Value, load_truth
 from services.object_detection.model import DetectionEvaluator
-from services.object_detection.score import MEASURES, DetectionLimits, Rules
 
 LOGIC = "opendlv.logic.perception.Detection"
 ANNOUNCEMENT = "opendlv.proxy.ImageReadingShm"
@@ -29,7 +28,9 @@ class ObjectDetection(DetectionEvaluator):
         """Raises ValueError for flags that leave something open."""
         flags = context.flags
         truth = _truth(flags)
-        super().__init__(truth, _rules(flags), _limits(flags))
+        if flags["from"] + flags["max-delay"] >= flags["max-time"]:
+            raise ValueError("no frame would be judged: --max-time must be longer than --from and --max-delay together")
+        super().__init__(truth, flags)
         self._sender = flags["sender"]
         self.inputs: dict[tuple[str, int | None], Handler] = _handlers(flags["sender"], self.detect)
         if truth is None:
@@ -67,16 +68,3 @@ def _truth(flags: Flags) -> Truth | None:
         if name not in truth.labels():
             raise ValueError(f"--classes: {path} has {no_box(name, truth.labels())}")
     return truth
-
-
-def _rules(flags: Flags) -> Rules:
-    if flags["from"] + flags["max-delay"] >= flags["max-time"]:
-        raise ValueError("no frame would be judged: --max-time must be longer than --from and --max-delay together")
-    times = (flags[name] for name in ("max-delay", "max-time", "from", "start-up"))
-    return Rules(flags["iou"], flags["classes"], *times)
-
-
-def _limits(flags: Flags) -> DetectionLimits:
-    precision, recall, f1 = (flags[f"min-{name}"] for name in MEASURES)
-    silence = flags["max-unanswered"], flags["max-gap"]
-    return DetectionLimits(precision, recall, f1, flags["min-frames"], flags["each-class"], *silence)

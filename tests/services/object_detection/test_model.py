@@ -1,11 +1,11 @@
 import json
+from typing import Any
 
 import pytest
 
-from services.base import UnjudgeableError, Verdict
+from services.base import Flags, UnjudgeableError, Verdict
 from services.object_detection.boxes import Box, FrameKey, LabelledBox, Truth
 from services.object_detection.model import DetectionEvaluator
-from services.object_detection.score import DetectionLimits, Rules
 from tests.services.built import hide
 
 SECOND = 1_000_000
@@ -16,12 +16,17 @@ BOARD = Truth("one", {0: (YELLOW, BLUE)})
 FILM = Truth("sample-time", {number * SECOND: (YELLOW, BLUE) for number in range(1, 6)})
 
 
-def judge(
-    truth: Truth | None = BOARD, limits: DetectionLimits | None = None, **rules: float | list[str]
-) -> DetectionEvaluator:
-    """A judge whose test has begun; ``rules`` replace the usual ones."""
-    usual = {"iou": 0.5, "labels": [], "max_delay": 1.0, "max_time": 60.0}
-    it = DetectionEvaluator(truth, Rules(**{**usual, **rules}), limits or DetectionLimits(recall=0.9))  # type: ignore[arg-type]
+def flags(**given: Any) -> Flags:
+    """Those given, and few limits."""
+    usual = {"iou": 0.5, "classes": [], "max-delay": 1.0, "max-time": 60.0, "from": 0.0, "start-up": 0.0,
+             "min-precision": None, "min-recall": 0.9, "min-f1": None, "min-frames": 1, "each-class": False,
+             "max-unanswered": None, "max-gap": None}  # fmt: skip
+    return Flags({**usual, **{name.replace("_", "-"): value for name, value in given.items()}})
+
+
+def judge(truth: Truth | None = BOARD, **given: Any) -> DetectionEvaluator:
+    """A judge whose test has begun."""
+    it = DetectionEvaluator(truth, flags(**given))
     it.update(BEGIN - SECOND)
     it.begin(BEGIN)
     return it
@@ -59,7 +64,7 @@ def values(verdict: Verdict) -> dict[str, float | None]:
 
 
 def test_what_is_found_passes() -> None:
-    it = judge(limits=DetectionLimits(0.7, 0.7, 0.7, frames=2))
+    it = judge(min_precision=0.7, min_recall=0.7, min_f1=0.7, min_frames=2)
     detect(it, 1, YELLOW, BLUE)
     at(it, 0.5)
     detect(it, 2, BLUE, LabelledBox("red", FAR))
@@ -81,7 +86,7 @@ def test_what_is_found_passes() -> None:
 
 
 def test_every_limit_that_is_broken_is_named_with_the_worst_frame() -> None:
-    it = judge(limits=DetectionLimits(0.9, 0.9, 0.9, frames=3))
+    it = judge(min_precision=0.9, min_recall=0.9, min_f1=0.9, min_frames=3)
     detect(it, 1, YELLOW, BLUE)
     at(it, 0.5)
     detect(it, 2, LabelledBox("yellow", FAR))
@@ -95,20 +100,20 @@ def test_every_limit_that_is_broken_is_named_with_the_worst_frame() -> None:
 
 
 def test_nothing_to_find_is_the_fault_of_the_test() -> None:
-    it = judge(truth=None, limits=DetectionLimits(0.0, 0.0, 0.0), labels=["yellow", "blue"])
+    it = judge(truth=None, min_precision=0.0, min_recall=0.0, min_f1=0.0, classes=["yellow", "blue"])
     reveal(it, 2, YELLOW)
     detect(it, 2, YELLOW)
     with pytest.raises(UnjudgeableError, match=r"^no true box of class 'blue' came before the input ended after 10.00"):
         decided(it)
-    it = judge(truth=Truth("number", {1: (), 2: (YELLOW,)}), labels=["blue"])
+    it = judge(truth=Truth("number", {1: (), 2: (YELLOW,)}), classes=["blue"])
     detect(it, 1, YELLOW)
     with pytest.raises(UnjudgeableError, match=r"^none of 2 frames has a true box before the input ended"):
         decided(it)
 
 
-def live(silent: range, frames: int = 30, limits: DetectionLimits | None = None, start_up: float = 0.0) -> Verdict:
+def live(silent: range, frames: int = 30, **given: float) -> Verdict:
     """The verdict when an application answers all frames, of 10 Hz, but some."""
-    it = judge(truth=None, limits=limits or DetectionLimits(recall=0.5, unanswered=0.1, gap=1.0), start_up=start_up)
+    it = judge(truth=None, **{"min_recall": 0.5, "max_unanswered": 0.1, "max_gap": 1.0, **given})
     for number in range(frames):
         at(it, number / 10)
         reveal(it, number / 10, YELLOW)
@@ -129,7 +134,7 @@ def test_frames_without_an_answer_are_named_by_their_longest_run() -> None:
 
 @pytest.mark.parametrize(("first", "outcome"), [(15, "passed"), (16, "failed")])
 def test_the_application_may_start_slowly(first: int, outcome: str) -> None:
-    verdict = live(range(first), start_up=1.5, limits=DetectionLimits(recall=0.1, unanswered=0.1, gap=1.0))
+    verdict = live(range(first), start_up=1.5, min_recall=0.1)
     assert verdict.outcome == outcome
     assert values(verdict)["answered"] == 30 - first, "recall counts them all the same"
 
@@ -199,7 +204,7 @@ def test_detections_that_come_late_do_not_count() -> None:
 
 
 def test_the_begin_forgets_what_was_before() -> None:
-    it = DetectionEvaluator(FILM, Rules(0.5, [], 1.0, 60.0), DetectionLimits(recall=1.0))
+    it = DetectionEvaluator(FILM, flags(min_recall=1.0))
     it.update(BEGIN - 9 * SECOND)
     detect(it, 1)
     detect(it, 2, YELLOW)
@@ -235,7 +240,7 @@ def frames(it: DetectionEvaluator) -> list[tuple[int, bool, list[list[object]]]]
 
 
 def test_what_became_of_each_box_is_recorded() -> None:
-    it = judge(limits=DetectionLimits(0.7, 0.7, 0.7, frames=2), labels=["yellow", "blue"])
+    it = judge(min_precision=0.7, min_recall=0.7, min_f1=0.7, min_frames=2, classes=["yellow", "blue"])
     near = LabelledBox("blue", Box(0.5, 0.1, 0.1, 0.08))
     detect(it, 1, near, LabelledBox("red", FAR), LabelledBox("blue", FAR))
     decided(it)
@@ -246,7 +251,7 @@ def test_what_became_of_each_box_is_recorded() -> None:
 def test_pictures_that_were_not_shown_are_neither_missed_nor_a_gap() -> None:
     """Of five pictures of a film, one a second, the third and the fourth were not shown."""
     for is_told, outcome in ((True, "passed"), (False, "failed")):
-        it = judge(FILM, DetectionLimits(recall=1.0, unanswered=0.0, gap=1.5))
+        it = judge(FILM, min_recall=1.0, max_unanswered=0.0, max_gap=1.5)
         for frame in (1, 2, 5):
             at(it, frame)
             detect(it, frame, YELLOW, BLUE)

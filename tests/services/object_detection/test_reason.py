@@ -4,7 +4,8 @@ from dodo_dsl.run.protocol import VerdictEvent
 from dodo_dsl.run.service_protocol import read
 from services.object_detection.boxes import Box, Detections, LabelledBox
 from services.object_detection.model import verdict
-from services.object_detection.score import Counts, CountsByClass, DetectionLimits, Score, compare
+from services.object_detection.score import Counts, CountsByClass, Score, compare
+from tests.services.object_detection.test_model import flags
 
 
 def score(hits: int, false: int, missed: int, **about: int) -> Score:
@@ -13,14 +14,14 @@ def score(hits: int, false: int, missed: int, **about: int) -> Score:
 
 
 def test_a_measure_without_a_value_says_why() -> None:
-    reason = verdict(score(0, 0, 0), DetectionLimits(precision=0.1, recall=0.1), "").reason
+    reason = verdict(score(0, 0, 0), flags(min_precision=0.1, min_recall=0.1), "").reason
     assert reason == (
         "precision has no value (at least 0.1), because nothing was detected; "
         "recall has no value (at least 0.1), because there was nothing to detect"
     )
 
 
-ALL = DetectionLimits(precision=0.9, recall=0.9, f1=0.9, each_class=True)
+ALL = flags(min_precision=0.9, min_recall=0.9, min_f1=0.9, each_class=True)
 
 
 def by_class(**counts: Counts) -> Score:
@@ -47,7 +48,7 @@ def test_a_class_that_is_worse_than_another_is_named() -> None:
 
 
 def test_f1_alone_is_told() -> None:
-    reason = verdict(score(8, 1, 1), DetectionLimits(precision=0.8, recall=0.8, f1=0.9), "").reason
+    reason = verdict(score(8, 1, 1), flags(min_precision=0.8, min_recall=0.8, min_f1=0.9), "").reason
     assert reason == "F1 is 0.8889 (at least 0.9), with 1 false detection and 1 missed beside 8 found"
 
 
@@ -86,5 +87,5 @@ def test_kinds_of_false_detections(found: LabelledBox, kind: str) -> None:
 def test_small_objects_are_missed() -> None:
     found = Score(CountsByClass({"a": Counts(1, 0, 1)}, missed=[0.05], found=[0.1]), frames=2, answered=2)
     assert "; missed objects are small: 0.05 of the picture's height on average, and found ones 0.1" in (
-        verdict(found, DetectionLimits(recall=0.9), "").reason
+        verdict(found, flags(), "").reason
     )
