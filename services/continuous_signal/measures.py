@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.envelope import MICROSECONDS
 from dodo_dsl.opendlv.recording_times import DAY
-from services.base import Check
+from services.base import Check, Flags, Share
 from services.base.evaluator import EARLY, Hidden
 from services.base.service import at_limit
 from services.continuous_signal.target import Target, Times, Values
@@ -133,39 +133,34 @@ _ROUNDING = 1e-12
 """By which a sample at the edge of a relative band may be outside of it."""
 
 
-@dataclass(frozen=True)
 class SignalLimits:
-    """Limits of a signal, in its own unit; None for no limit.
+    """The service's flags, times of them in us; values are ``exact`` to a share of themselves, and may be so far off.
 
-    `start` and `until` are the window of time that is judged, both included; at least `samples` have to be judged.
-    A sample holds until the next one and at most for `hold`: of the judged time a share of `coverage` has to be
-    held, and no time without a sample may be longer than `gap`. A sample whose time is more than `delay` from its
-    arrival is late. A `relative` band is a share of the target's size, and no less than `floor`; the target has a sign
-    beyond that. Until the first sample nothing has to be held if that comes within `start_up` of the target's time.
-    All times in microseconds, but for `lag` in seconds, by which the signal may follow its target late. It may keep
-    one value for `repeats` samples. Values are ``exact`` to a share of themselves, and keep limits that are so near.
+    A band that is a share of the target's size is ``relative``, and no less than ``floor``.
     """
 
-    mean: float | None = None
-    std: float | None = None
-    distance: float | None = None
-    band: float | None = None
-    share: float | None = None
-    samples: int = 1
-    start: int = 0
-    until: int | None = None
-    coverage: float | None = None
-    gap: int | None = None
-    hold: int = MICROSECONDS // 2
-    delay: int | None = None
-    start_up: int = 0
-    lag: float | None = None
-    repeats: int | None = None
-    relative: bool = False
-    floor: float = 0.0
-    frame_share: float | None = None
-    sign_share: float | None = None
-    exact: float = 0.0
+    def __init__(self, flags: Flags, exact: float = 0.0) -> None:
+        """Raises ValueError for flags that do not fit together."""
+        for name in ("min-share", "min-frame-share"):
+            if flags[name] is not None and flags["band"] is None:
+                raise ValueError(f"--{name} needs --band, the distance that counts as inside")
+        band, self.floor = flags["band"], flags["band-floor"] or 0.0
+        self.relative = isinstance(band, Share)
+        if self.floor and not self.relative and flags["min-sign-share"] is None:
+            raise ValueError(
+                "--band-floor needs a --band that is a share of the target, such as 25%, or --min-sign-share"
+            )
+        if flags["until"] is not None and flags["until"] <= flags["from"]:
+            raise ValueError(f"--until={flags['until']:g} is not after --from={flags['from']:g}")
+        self.flags, self.exact = flags, exact
+        self.band: float | None = band.of_one if isinstance(band, Share) else band
+        times = (round(flags[name] * MICROSECONDS) for name in ("from", "hold", "start-up", "max-delay"))
+        self.start, self.hold, self.start_up, self.delay = times
+        self.until = None if flags["until"] is None else round(flags["until"] * MICROSECONDS)
+
+    def __getitem__(self, name: str) -> float | None:
+        value: float | None = self.flags[name]
+        return value
 
     def exact_to(self, *values: Values) -> float:
         """To what the distance between values is exact."""
@@ -218,27 +213,25 @@ class SignalMeasures:
     unanswered: int = 0
 
     def checks(self, limits: SignalLimits) -> tuple[Check, ...]:
-        shares = [("share", self.share, limits.share)] if limits.band is not None else []
-        by_frames = (("frame-share", self.frame_share), ("sign-share", self.sign_share))
-        wanted = (limits.frame_share, limits.sign_share)
-        shares += [(*each, limit) for each, limit in zip(by_frames, wanted, strict=True) if limit is not None]
         held, gap = (self.coverage.share, self.coverage.gap) if self.coverage else (None, None)
-        longest = None if limits.gap is None else limits.gap / MICROSECONDS
-        lag = () if limits.lag is None else (Check.most("lag", self.lag, limits.lag, "s"),)
         run = self.repeats.samples if self.repeats else None
-        repeats = () if limits.repeats is None else (Check.most("repeats", run, limits.repeats),)
+        asked = (
+            Check.least("share", self.share, limits["min-share"]),
+            Check.least("frame-share", self.frame_share, limits["min-frame-share"]),
+            Check.least("sign-share", self.sign_share, limits["min-sign-share"]),
+            Check.most("lag", self.lag, limits["max-lag"], "s"),
+            Check.most("repeats", run, limits["max-repeats"]),
+        )
         return (
-            Check.most("mean", self.mean, limits.mean),
-            Check.most("std", self.std, limits.std),
-            Check.most("distance", self.distance, limits.distance),
-            Check.most("mean-over-time", self.mean_over_time, limits.mean, parameters=("max-mean",)),
-            Check.most("std-over-time", self.std_over_time, limits.std, parameters=("max-std",)),
-            *(Check.least(name, value, limit) for name, value, limit in shares),
-            *lag,
-            *repeats,
-            Check.least("samples", self.samples, limits.samples),
-            Check.most("gap", gap, longest, "s"),
-            Check.least("coverage", held, limits.coverage),
+            Check.most("mean", self.mean, limits["max-mean"]),
+            Check.most("std", self.std, limits["max-std"]),
+            Check.most("distance", self.distance, limits["max-distance"]),
+            Check.most("mean-over-time", self.mean_over_time, limits["max-mean"], parameters=("max-mean",)),
+            Check.most("std-over-time", self.std_over_time, limits["max-std"], parameters=("max-std",)),
+            *(check for check in asked if check.limit or (check.name == "share" and limits.band is not None)),
+            Check.least("samples", self.samples, limits["min-samples"]),
+            Check.most("gap", gap, limits["max-gap"], "s"),
+            Check.least("coverage", held, limits["min-coverage"]),
             Check("outside", self.outside),
             Check.most("broken", len(self.broken), 0),
         )
@@ -301,15 +294,15 @@ def measure(
         samples=samples,
         outside=outside,
         broken=broken,
-        mean=at_limit(float(distances.mean()), limits.mean, exact),
-        std=at_limit(float(distances.std()), limits.std, exact),
-        distance=at_limit(float(distances[at]), limits.distance, exact),
+        mean=at_limit(float(distances.mean()), limits["max-mean"], exact),
+        std=at_limit(float(distances.std()), limits["max-std"], exact),
+        distance=at_limit(float(distances[at]), limits["max-distance"], exact),
         share=None if limits.band is None else _average(inside, weights),
         worst=WorstSample(float(times[at]) / MICROSECONDS, float(values[at]), float(expected[at])),
-        mean_over_time=at_limit(mean, limits.mean, exact),
-        std_over_time=at_limit(std, limits.std, exact),
+        mean_over_time=at_limit(mean, limits["max-mean"], exact),
+        std_over_time=at_limit(std, limits["max-std"], exact),
         coverage=coverage,
-        lag=lag(target, times, values) if limits.lag is not None or samples <= MOST_LAGS else None,
+        lag=lag(target, times, values) if limits["max-lag"] is not None or samples <= MOST_LAGS else None,
         repeats=longest_run(times, values),
         likeness=likeness(target, times, values),
         frame_share=None if limits.band is None else _share(inside, len(missed)),
@@ -381,7 +374,7 @@ class LateFacts(NamedTuple):
 
 
 class LateSamples:
-    """Samples are late whose time is more than ``delay`` us before their arrival; None believes all.
+    """Samples are late whose time is more than ``delay`` us before their arrival.
 
     Those of more than EARLY us after it are not believed, either.
 
@@ -389,7 +382,7 @@ class LateSamples:
     that is so much newer.
     """
 
-    def __init__(self, delay: int | None, is_test_time: bool) -> None:
+    def __init__(self, delay: int, is_test_time: bool) -> None:
         self._delay, self._is_test_time = delay, is_test_time
         self._count = 0
         self.delays: array[int] = array("q")
@@ -422,8 +415,6 @@ class LateSamples:
         return LateFacts(self._count, time, arrival, date)
 
     def _is_late(self, time: int, arrival: int) -> bool:
-        if self._delay is None:
-            return False
         if self._is_test_time:
             return arrival - time > self._delay or time - arrival > min(EARLY, self._delay)
         return self.newest is not None and self.newest.time - time > self._delay

@@ -165,23 +165,24 @@ class SignalEvaluator(Evaluator):
         signal: str,
         target: Target | None,
         limits: SignalLimits,
-        max_time: float,
         from_begin: bool,
         frames: Times | None = None,
         is_copied: bool = True,
     ) -> None:
-        """``signal`` is its name in sentences, ``max_time`` in s; ``from_begin``: samples count from the start.
+        """``signal`` is its name in sentences; ``from_begin``: samples count from the start.
 
         ``frames`` are the times of the pictures that samples answer, on the target's own scale, which they have if
         these ``is_copied``.
         """
-        super().__init__(max_time)
+        super().__init__(limits.flags["max-time"])
         self._signal, self._target, self._limits = signal, target, limits
         self._frames, self._is_copied = frames, is_copied
         self._from_begin = from_begin or target is None
         self._samples, self._targets = Samples(), Samples()
         self._late = LateSamples(limits.delay, self._from_begin)
-        self.plot = self.judged.series(signal, distance=limits.distance, band=None if limits.relative else limits.band)
+        self.plot = self.judged.series(
+            signal, distance=limits["max-distance"], band=None if limits.relative else limits.band
+        )
 
     def take(self, value: float, time: int) -> None:
         """A sample of the signal; a value that is not finite is a fault of the application."""
@@ -217,7 +218,7 @@ class SignalEvaluator(Evaluator):
             raise UnjudgeableError(f"no frame was shown {span.within}, so there was nothing to answer")
         about = self._limits, judged, frames, hidden, self._is_copied
         measures = measure(target, times, values, *about)
-        if self._limits.sign_share is not None and measures.samples and measures.sign_share is None:
+        if self._limits["min-sign-share"] is not None and measures.samples and measures.sign_share is None:
             raise UnjudgeableError(f"the target is nowhere farther than {self._limits.floor:g} from 0: it has no sign")
         said = verdict(self._signal, target, measures, self._limits, span.within, self._late.facts(start))
         self.notes = [*self._notes(measures)]
@@ -231,7 +232,7 @@ class SignalEvaluator(Evaluator):
         run, lag, delays = measures.repeats, measures.lag, self._late.delays
         if run and 1 < run.samples == measures.samples:
             yield f"all {run.samples} samples of {self._signal} have the same value, {said(run.value)}"
-        if lag and self._limits.lag is None:
+        if lag and self._limits["max-lag"] is None:
             yield f"{self._signal} follows its target {lag:.2f} s late, and no max-lag is set"
         if delays and (delay := float(np.median(delays))) > EARLY:
             yield f"samples of {self._signal} came {delay / MICROSECONDS:.2f} s after their time (median)"
@@ -243,7 +244,7 @@ class SignalEvaluator(Evaluator):
         times, values = self._samples.since(start)
         expected, limits = target.at(times), self._limits
         away, exact = np.abs(values - expected), limits.exact_to(values, expected)
-        marks = np.select([away > (np.inf if limits.distance is None else limits.distance) + exact,
+        marks = np.select([away > (np.inf if limits["max-distance"] is None else limits["max-distance"]) + exact,
                            away > limits.band_at(expected) + exact], [FAILED, WARNED])  # fmt: skip
         marks[~np.isfinite(values)] = FAILED
         marks[(times < limits.start) | (times > (np.inf if limits.until is None else limits.until))] = 0
@@ -280,9 +281,8 @@ class SignalEvaluator(Evaluator):
         newest = self._late.newest
         if is_complete or newest is None:
             return int(target.times[-1])
-        observed = newest.time - target.start + (now - newest.arrival)
-        least = 0 if self._limits.delay is None else min(now - self.zero, round(self._max_time * MICROSECONDS))
-        return max(observed, least - (self._limits.delay or 0))
+        observed: int = newest.time - target.start + (now - newest.arrival)
+        return max(observed, min(now - self.zero, round(self._max_time * MICROSECONDS)) - self._limits.delay)
 
 
 def farthest_of(order: NDArray[np.int64], away: Values) -> list[int]:

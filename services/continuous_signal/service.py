@@ -1,6 +1,5 @@
 """The evaluator of a signal on the bus."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +7,7 @@ import numpy as np
 
 from dodo_dsl.opendlv.envelope import MICROSECONDS
 from dodo_dsl.opendlv.message_set import MessageSet
-from services.base import Context, Flags, Share
+from services.base import Context, Flags
 from services.base.service import SINGLE
 from services.continuous_signal.measures import SignalLimits
 from services.continuous_signal.model import SignalEvaluator
@@ -42,9 +41,9 @@ class ContinuousSignal(SignalEvaluator):
         if target is not None and from_begin and target.span[0] >= flags["max-time"]:
             first = f"{flags['target']}: the target begins {target.span[0]:,.1f} s after the start"
             raise ValueError(f"{first}, when --max-time={flags['max-time']:g} is over: nothing could be judged")
-        limits = replace(_limits(flags), exact=SINGLE if is_single(signal, context.messages) else 0.0)
+        limits = SignalLimits(flags, SINGLE if is_single(signal, context.messages) else 0.0)
         frames = None if target is None else _frames(flags, target)
-        super().__init__(name, target, limits, flags["max-time"], from_begin, frames, is_copied=not from_begin)
+        super().__init__(name, target, limits, from_begin, frames, is_copied=not from_begin)
         self._source, self._target_source = signal, other
         self.plot.name = f"{signal.field} of {signal.message.rpartition('.')[2]}/{signal.sender}"
         self.inputs = {(signal.message, signal.sender): self._take}
@@ -96,36 +95,3 @@ def _frames(flags: Flags, target: Target) -> Times | None:
     if flags["rec"]:
         return due_times(Path(flags["rec"]), sender, flags["start"] or 0.0, flags["end"], flags["timemod"] or 1.0)
     return np.arange(0, flags["max-time"] * MICROSECONDS, MICROSECONDS / flags["freq"]) if flags["freq"] else None
-
-
-def _limits(flags: Flags) -> SignalLimits:
-    for name in ("min-share", "min-frame-share"):
-        if flags[name] is not None and flags["band"] is None:
-            raise ValueError(f"--{name} needs --band, the distance that counts as inside")
-    band = flags["band"]
-    if flags["band-floor"] and not isinstance(band, Share) and flags["min-sign-share"] is None:
-        raise ValueError("--band-floor needs a --band that is a share of the target, such as 25%, or --min-sign-share")
-    until = flags["until"]
-    if until is not None and until <= flags["from"]:
-        raise ValueError(f"--until={until:g} is not after --from={flags['from']:g}")
-    return SignalLimits(
-        mean=flags["max-mean"],
-        std=flags["max-std"],
-        distance=flags["max-distance"],
-        band=band.of_one if isinstance(band, Share) else band,
-        relative=isinstance(band, Share),
-        floor=flags["band-floor"] or 0.0,
-        frame_share=flags["min-frame-share"],
-        sign_share=flags["min-sign-share"],
-        share=flags["min-share"],
-        samples=flags["min-samples"],
-        lag=flags["max-lag"],
-        repeats=flags["max-repeats"],
-        start=round(flags["from"] * MICROSECONDS),
-        until=None if until is None else round(until * MICROSECONDS),
-        coverage=flags["min-coverage"],
-        gap=round(flags["max-gap"] * MICROSECONDS),
-        hold=round(flags["hold"] * MICROSECONDS),
-        start_up=round(flags["start-up"] * MICROSECONDS),
-        delay=round(flags["max-delay"] * MICROSECONDS),
-    )

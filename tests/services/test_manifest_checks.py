@@ -10,11 +10,11 @@ import yaml
 from dodo_dsl.opendlv.assets.track import Track
 from services.base import Check
 from services.collision.model import DriveMeasures, Requests
-from services.continuous_signal.measures import SignalLimits, SignalMeasures
-from services.coverage.model import CoverageEvaluator, CoverageGrid, Footprint
-from services.object_detection.score import Counts, CountsByClass, DetectionLimits, Score
-from services.responds.model import ResponseEvaluator, ResponseLimits, at_rate
+from services.continuous_signal.measures import SignalMeasures
+from services.object_detection.score import Counts, CountsByClass, Score
 from tests.services.built import built
+from tests.services.continuous_signal.test_model import limits
+from tests.services.object_detection.test_model import flags
 
 SERVICES = Path(__file__).parents[2] / "services"
 
@@ -43,23 +43,24 @@ def test_collision() -> None:
 
 
 def test_continuous_signal() -> None:
-    limits = SignalLimits(band=1.0, lag=1.0, repeats=3, gap=1, frame_share=0.5, sign_share=0.5)
-    compare("continuous_signal", (*SignalMeasures(0, 0, 0, ()).checks(limits), Check("late", 0)))
+    asked = limits(band=1.0, max_lag=1.0, max_repeats=3, max_gap=1, min_frame_share=0.5, min_sign_share=0.5)
+    compare("continuous_signal", (*SignalMeasures(0, 0, 0, ()).checks(asked), Check("late", 0)))
 
 
 def test_coverage() -> None:
-    grid = CoverageGrid(shapely.box(0, 0, 1, 1), 0.5, Footprint(1, 1))
-    compare("coverage", CoverageEvaluator("a", grid, 0.5, 1).checks())
+    with built("coverage", "--x-min=0", "--x-max=1", "--y-min=0", "--y-max=1") as judge:
+        compare("coverage", judge._verdict("failed", "").checks)
 
 
 def test_responds() -> None:
-    judge = ResponseEvaluator("a", "b", at_rate(1, 1), ResponseLimits(1, 1, 1, 1, low=0, high=1), 1)
-    compare("responds", judge.checks(1, 1))
+    with built("responds", "--message=opendlv.proxy.GroundSteeringRequest", "--field=groundSteering",
+               "--freq=1", "--min=0", "--max=1") as judge:  # fmt: skip
+        compare("responds", judge.checks(1, 1))
 
 
 def test_object_detection() -> None:
     score = Score(CountsByClass({"yellow": Counts(1)}))
-    compare("object_detection", score.checks(DetectionLimits()))
+    compare("object_detection", score.checks(flags()))
 
 
 def test_trajectory_error() -> None:

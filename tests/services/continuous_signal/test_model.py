@@ -3,39 +3,49 @@ import json
 import math
 from array import array
 from collections.abc import Callable
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.base import UnjudgeableError, Verdict
+from services.base import Flags, Share, UnjudgeableError, Verdict
+from services.base.flags import load_manifest
 from services.base.service import SINGLE
 from services.continuous_signal import model
 from services.continuous_signal.measures import SignalLimits, measure
 from services.continuous_signal.model import SignalEvaluator
 from services.continuous_signal.target import Target
 from tests.services.built import hide
+from tests.services.process import ROOT
 
 SECOND = 1_000_000
 BEGIN = 7_000 * SECOND
+MANIFEST = load_manifest(ROOT / "services" / "continuous_signal")
 RAMP = Target(np.array([0, 10 * SECOND]), np.array([0.0, 1.0]))
 SIGNAL = "groundSteering of opendlv.proxy.GroundSteeringRequest/0"
 samples = st.lists(st.tuples(st.integers(-2 * SECOND, 12 * SECOND), st.floats(-5, 5)), max_size=40)
 
 
-def judge(
-    limits: SignalLimits, target: Target | None = RAMP, from_begin: bool = True, max_time: float = 60.0
-) -> SignalEvaluator:
-    it = SignalEvaluator(SIGNAL, target, limits, max_time, from_begin)
+def limits(exact: float = 0.0, **given: Any) -> SignalLimits:
+    """Those given, with ``start`` for ``from``, and few others."""
+    usual = dict.fromkeys(MANIFEST["parameters"])
+    usual |= {"from": 0.0, "hold": 0.5, "start-up": 0.0, "max-delay": 1.0, "max-time": 60.0, "min-samples": 1}
+    renamed = {"from" if name == "start" else name.replace("_", "-"): value for name, value in given.items()}
+    return SignalLimits(Flags({**usual, **renamed}), exact)
+
+
+def judge(limits: SignalLimits, target: Target | None = RAMP, from_begin: bool = True) -> SignalEvaluator:
+    it = SignalEvaluator(SIGNAL, target, limits, from_begin)
     it.update(BEGIN - SECOND)
     it.begin(BEGIN)
     return it
 
 
-def hear(it: SignalEvaluator, *heard: tuple[float, float]) -> None:
+def hear(it: SignalEvaluator, *heard: tuple[float, float], delay: float = 0.0) -> None:
     for time, value in heard:
+        it.arrived = BEGIN + round((time + delay) * SECOND)
         it.take(value, BEGIN + round(time * SECOND))
 
 
@@ -53,7 +63,7 @@ def values(verdict: Verdict) -> dict[str, float | None]:
 def test_the_measures_are_those_of_the_thesis(heard: list[tuple[int, float]], band: float) -> None:
     """Equations 4.6 to 4.9 in numpy and plain Python, on a target that is time itself over 10 s."""
     times, signal = np.array([t for t, _ in heard], np.int64), np.array([v for _, v in heard])
-    found = measure(RAMP, times, signal, SignalLimits(band=band))
+    found = measure(RAMP, times, signal, limits(band=band))
     d = [abs(v - t / (10 * SECOND)) for t, v in heard if 0 <= t <= 10 * SECOND]
     assert (found.received, found.samples) == (sum(t >= 0 for t, _ in heard), len(d))
     assert found.outside == sum(t > 10 * SECOND for t, _ in heard)
@@ -78,7 +88,7 @@ def test_time_is_judged_as_its_held(heard: list[tuple[int, float]], band: float,
     heard = sorted({round(t, -4): v for t, v in heard}.items())
     hold = max(step, round(hold, -4))
     times, signal = np.array([t for t, _ in heard], np.int64), np.array([v for _, v in heard])
-    found = measure(RAMP, times, signal, SignalLimits(band=band, hold=hold))
+    found = measure(RAMP, times, signal, limits(band=band, hold=hold / SECOND))
     grid = np.arange(0, 10 * SECOND, step)
     inside = (times >= 0) & (times <= 10 * SECOND)
     times, d = times[inside], np.abs(signal - RAMP.at(times))[inside]
@@ -96,7 +106,7 @@ def test_time_is_judged_as_its_held(heard: list[tuple[int, float]], band: float,
 
 
 def test_a_signal_on_its_target_passes() -> None:
-    it = judge(SignalLimits(mean=0.1, std=0.1, distance=0.2, band=0.1, share=0.75, samples=4, hold=5 * SECOND))
+    it = judge(limits(max_mean=0.1, max_std=0.1, max_distance=0.2, band=0.1, min_share=0.75, min_samples=4, hold=5))
     hear(it, (0, 0), (2.5, 0.25), (5, 0.625), (7.5, 0.75))
     assert decided(it) == Verdict("passed", (
         f"{SIGNAL} kept to its target over 4 samples: mean 0.03125 (at most 0.1), std 0.05413 (at most 0.1), "
@@ -113,7 +123,7 @@ def test_a_signal_on_its_target_passes() -> None:
 
 
 def test_every_limit_that_is_broken_is_named_with_the_worst_sample() -> None:
-    it = judge(SignalLimits(mean=0.1, std=0.1, distance=0.2, band=0.1, share=0.9))
+    it = judge(limits(max_mean=0.1, max_std=0.1, max_distance=0.2, band=0.1, min_share=0.9))
     hear(it, (0, 0), (5, -0.5))
     assert decided(it).outcome == "failed"
     assert decided(it).reason == (
@@ -128,7 +138,7 @@ def test_every_limit_that_is_broken_is_named_with_the_worst_sample() -> None:
 
 def test_an_application_that_falls_silent_fails() -> None:
     """A good start does not make up for silence, however many samples it has."""
-    it = judge(SignalLimits(mean=0.01, coverage=0.9, gap=SECOND))
+    it = judge(limits(max_mean=0.01, min_coverage=0.9, max_gap=1))
     hear(it, *((step / 50, step / 500) for step in range(100)))
     assert decided(it).outcome == "failed"
     assert decided(it).reason.startswith(
@@ -140,7 +150,7 @@ def test_an_application_that_falls_silent_fails() -> None:
 
 @pytest.mark.parametrize(("first", "outcome"), [(2.0, "passed"), (2.1, "failed")])
 def test_the_application_may_start_slowly(first: float, outcome: str) -> None:
-    it = judge(SignalLimits(mean=1.0, coverage=1.0, gap=SECOND, start_up=2 * SECOND))
+    it = judge(limits(max_mean=1.0, min_coverage=1.0, max_gap=1, start_up=2))
     hear(it, *((time, time / 10) for time in np.arange(first, 10, 0.1)))
     assert decided(it).outcome == outcome
     if outcome == "failed":
@@ -150,7 +160,7 @@ def test_the_application_may_start_slowly(first: float, outcome: str) -> None:
 def test_samples_in_a_burst_do_not_hide_bad_time() -> None:
     """A thousand good samples within a second, and a few bad ones afterwards."""
     heard = [*((0.5 + step / 2000, 0.05 + step / 20_000) for step in range(1000)), *((s, 2.0) for s in range(2, 10))]
-    it = judge(SignalLimits(mean=0.1, hold=SECOND))
+    it = judge(limits(max_mean=0.1, hold=1))
     hear(it, *heard)
     assert values(decided(it))["mean"] < 0.1  # type: ignore[operator]
     assert decided(it).outcome == "failed" and decided(it).reason.startswith("the mean distance over time is 1.")
@@ -158,7 +168,7 @@ def test_samples_in_a_burst_do_not_hide_bad_time() -> None:
 
 def test_a_sample_is_not_believed_far_from_its_arrival() -> None:
     """Neither the future nor a hole can be answered."""
-    it = judge(SignalLimits(mean=1.0, coverage=0.5, delay=SECOND))
+    it = judge(limits(max_mean=1.0, min_coverage=0.5, max_delay=1))
     for arrival, time in ((0.5, 0.5), (1.0, 9.0), (9.0, 3.0), (9.5, 9.4)):
         it.arrived = BEGIN + round(arrival * SECOND)
         it.take(time / 10, BEGIN + round(time * SECOND))
@@ -170,8 +180,8 @@ def test_a_sample_is_not_believed_far_from_its_arrival() -> None:
 
 def test_with_sample_times_of_their_own_nobody_stays_where_it_is_easy() -> None:
     """Not even when time is over before the input ends."""
-    limits = SignalLimits(mean=1.0, coverage=0.9, delay=SECOND)
-    it = judge(limits, Target(RAMP.times, RAMP.values, 500 * SECOND), max_time=9, from_begin=False)
+    limited = limits(max_mean=1.0, min_coverage=0.9, max_time=9)
+    it = judge(limited, Target(RAMP.times, RAMP.values, 500 * SECOND), from_begin=False)
     for step in range(90):
         it.arrived = BEGIN + step * SECOND // 10
         it.take(0.2, 502 * SECOND + step % 9 * SECOND // 10)
@@ -181,21 +191,21 @@ def test_with_sample_times_of_their_own_nobody_stays_where_it_is_easy() -> None:
 
 
 @pytest.mark.parametrize(
-    ("limits", "seconds", "text"),
+    ("limited", "seconds", "text"),
     [
-        (SignalLimits(mean=1.0, start=12 * SECOND), 20, "judged is from 12.00 s"),
-        (SignalLimits(mean=1.0, start=5 * SECOND, until=8 * SECOND), 4,
+        (limits(max_mean=1.0, start=12), 20, "judged is from 12.00 s"),
+        (limits(max_mean=1.0, start=5, until=8), 4,
          "judged is from 5.00 s until 8.00 s, and the test ended after 4.00 s"),
     ],
 )  # fmt: skip
-def test_a_window_without_a_target_is_the_fault_of_the_test(limits: SignalLimits, seconds: int, text: str) -> None:
+def test_a_window_without_a_target_is_the_fault_of_the_test(limited: SignalLimits, seconds: int, text: str) -> None:
     with pytest.raises(UnjudgeableError) as raised:
-        decided(judge(limits), seconds)
+        decided(judge(limited), seconds)
     assert str(raised.value) == f"no time to judge: the target is from 0.00 s to 10.00 s, {text}"
 
 
 def test_no_sample_is_never_a_pass() -> None:
-    verdict = decided(judge(SignalLimits(mean=9.0)), 12.5)
+    verdict = decided(judge(limits(max_mean=9.0)), 12.5)
     assert (verdict.outcome, verdict.reason) == (
         "failed",
         f"no sample of {SIGNAL} came before the input ended after 12.50 s",
@@ -205,16 +215,16 @@ def test_no_sample_is_never_a_pass() -> None:
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_a_sample_that_is_no_number_fails(value: float) -> None:
-    it = judge(SignalLimits(mean=9.0))
+    it = judge(limits(max_mean=9.0))
     hear(it, (4, 0.4), (7, value), (5, value))
     assert decided(it).reason.startswith("2 samples are not finite numbers, the first at 5.00 s; worst at 4.00 s")
-    it = judge(SignalLimits(mean=9.0))
+    it = judge(limits(max_mean=9.0))
     hear(it, (7, value))
     assert decided(it).reason == f"{SIGNAL} was not a finite number in its one sample, first at 7.00 s"
 
 
 def test_a_live_target_is_interpolated_when_all_is_there() -> None:
-    it = judge(SignalLimits(mean=0.0, distance=0.0), target=None)
+    it = judge(limits(max_mean=0.0, max_distance=0.0), target=None)
     hear(it, (1, 0.125), (4, 0.5), (9, 9.0))
     for time, value in ((8, 1.0), (0, 0.0), (2, 0.25)):
         it.take_target(value, BEGIN + time * SECOND)
@@ -222,7 +232,7 @@ def test_a_live_target_is_interpolated_when_all_is_there() -> None:
 
 
 def test_without_a_live_target_there_is_no_verdict() -> None:
-    it = judge(SignalLimits(mean=0.0), target=None)
+    it = judge(limits(max_mean=0.0), target=None)
     hear(it, (1, 0.1))
     with pytest.raises(UnjudgeableError, match=r"^no sample of the target came before the input ended after 3.00 s$"):
         it.end_of_input(BEGIN + 3 * SECOND)
@@ -232,7 +242,7 @@ def test_without_a_live_target_there_is_no_verdict() -> None:
 
 def test_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(model, "MOST_IN_MEMORY", 3)
-    it = judge(SignalLimits(mean=1e-9, samples=1))
+    it = judge(limits(max_mean=1e-9, min_samples=1))
     hear(it, (1, 0.1), (2, 0.2), (3, 0.3))
     it.update(BEGIN + 4 * SECOND)
     assert it.verdict is not None and it.verdict.outcome == "passed"
@@ -256,7 +266,7 @@ def recorded(it: SignalEvaluator) -> dict[str, tuple[list[float], list[float], l
 
 def test_what_is_recorded_is_marked_as_it_was_judged() -> None:
     """By the target at its time, and in the window alone."""
-    it = judge(SignalLimits(distance=0.3, band=0.1, start=SECOND, samples=1))
+    it = judge(limits(max_distance=0.3, band=0.1, start=1, min_samples=1))
     hear(it, (5, 0.9), (0.5, 3.0), (2, 0.2), (3, 0.45), (4, math.nan), (11, 0.5))
     decided(it)
     found = recorded(it)
@@ -272,12 +282,12 @@ def shares(verdict: Verdict) -> dict[str, float | None]:
 
 def test_a_band_may_be_a_share_of_the_target_with_a_floor() -> None:
     """Inside are 1.25 times the target, and 0.05 where that is more: at 0 s and at 1 s, but not at 8 s."""
-    limits = SignalLimits(band=0.25, relative=True, floor=0.05, share=0.5, frame_share=0.75, hold=SECOND)
-    it = judge(limits)
+    given = {"band": Share(0.25), "band_floor": 0.05, "min_share": 0.5, "hold": 1}
+    it = judge(limits(**given, min_frame_share=0.75))
     hear(it, (0, 0.05), (1, 0.05), (4, 0.5), (8, 1.01))
     assert shares(decided(it)) == {"share": 0.75, "frame-share": 0.75}
     assert decided(it).outcome == "passed"
-    it = judge(replace(limits, frame_share=0.8))
+    it = judge(limits(**given, min_frame_share=0.8))
     hear(it, (0, 0.06), (1, 0.05), (4, 0.5), (8, 1.01))
     assert decided(it).reason.startswith(
         "the share of frames within 25 % or 0.05 of the target is 0.5 (at least 0.8); worst at"
@@ -286,8 +296,8 @@ def test_a_band_may_be_a_share_of_the_target_with_a_floor() -> None:
 
 def test_a_frame_without_a_sample_is_outside_of_the_band_and_has_no_sign() -> None:
     frames = np.arange(0, 10 * SECOND, SECOND)
-    limits = SignalLimits(band=0.25, relative=True, floor=0.15, frame_share=0.8, sign_share=0.9)
-    it = SignalEvaluator(SIGNAL, RAMP, limits, 60.0, True, frames)
+    limited = limits(band=Share(0.25), band_floor=0.15, min_frame_share=0.8, min_sign_share=0.9)
+    it = SignalEvaluator(SIGNAL, RAMP, limited, True, frames)
     it.begin(BEGIN)
     hear(it, *((step, step / 10 * (-1 if step == 1 else 1)) for step in range(8)))
     assert shares(decided(it)) == {"share": 0.875, "frame-share": 0.7, "sign-share": 0.75}
@@ -295,7 +305,7 @@ def test_a_frame_without_a_sample_is_outside_of_the_band_and_has_no_sign() -> No
 
 
 def test_a_target_without_a_sign_is_an_error_of_the_test() -> None:
-    it = judge(SignalLimits(floor=2.0, sign_share=0.5))
+    it = judge(limits(band_floor=2.0, min_sign_share=0.5))
     hear(it, (1, 0.1))
     with pytest.raises(UnjudgeableError, match=r"^the target is nowhere farther than 2 from 0: it has no sign$"):
         decided(it)
@@ -303,17 +313,17 @@ def test_a_target_without_a_sign_is_an_error_of_the_test() -> None:
 
 def test_nothing_has_to_be_held_while_no_frame_is_shown() -> None:
     """Samples at 10 Hz from 4 s to 6 s and from 8 s on; nothing was shown before 4 s and from 6 s to 8 s."""
-    limits = SignalLimits(coverage=1.0, gap=SECOND // 10, hold=SECOND // 10)
+    limited = limits(min_coverage=1.0, max_gap=0.1, hold=0.1)
     heard = [(step / 10, step / 100) for step in (*range(40, 60), *range(80, 101))]
     for is_told, expected in ((True, ("passed", 1.0, 0.1)), (False, ("failed", 0.4, 4.0))):
-        it = judge(limits)
+        it = judge(limited)
         for begin, end in ((0, 1), (1, 4), (6, 7), (7, 8)) if is_told else ():
             hide(it, BEGIN + begin * SECOND, BEGIN + end * SECOND)
         hear(it, *heard)
         verdict = decided(it)
         found = values(verdict)
         assert (verdict.outcome, found["coverage"], found["gap"]) == (expected[0], *map(pytest.approx, expected[1:]))
-    it = judge(limits)
+    it = judge(limited)
     hide(it, BEGIN, BEGIN + 90 * SECOND)
     hear(it, (1, 0.1))
     with pytest.raises(UnjudgeableError, match="no frame was shown"):
@@ -322,7 +332,7 @@ def test_nothing_has_to_be_held_while_no_frame_is_shown() -> None:
 
 def test_frames_are_counted_where_samples_have_times_of_their_own() -> None:
     """Of 40 frames of 10 Hz 10 are answered, at any time; the target has its sign in all but the first."""
-    it = SignalEvaluator(SIGNAL, RAMP, SignalLimits(band=1.0, frame_share=0.5, sign_share=0.5), 60.0, True,
+    it = SignalEvaluator(SIGNAL, RAMP, limits(band=1.0, min_frame_share=0.5, min_sign_share=0.5), True,
                          np.arange(0, 10 * SECOND, SECOND // 10), is_copied=False)  # fmt: skip
     it.begin(BEGIN)
     hear(it, *[(step * 0.37, 1.0) for step in range(10)])
@@ -345,34 +355,33 @@ def test_a_verdict_is_noted_that_says_nothing_of_a_blind_or_late_signal(
     value: Callable[[float], float], delay: float, notes: list[str]
 ) -> None:
     target = Target(np.array([0, 3 * SECOND, 10 * SECOND]), np.array([0.3, 0.0, 0.7]))
-    it = judge(SignalLimits(distance=0.65, delay=SECOND), target)
+    it = judge(limits(max_distance=0.65, max_delay=1), target)
     for step in range(101):
-        it.arrived = BEGIN + step * SECOND // 10 + round(delay * SECOND)
-        hear(it, (step / 10, value(step / 10)))
+        hear(it, (step / 10, value(step / 10)), delay=delay)
     decided(it)
     assert it.notes == [each.format(SIGNAL) for each in notes]
 
 
 def test_limits_that_0_keeps_are_noted() -> None:
-    it = judge(SignalLimits(distance=1.0))
+    it = judge(limits(max_distance=1.0))
     hear(it, *((step / 10, step / 100) for step in range(101)))
     assert decided(it).outcome == "passed"
     assert it.notes == ["a signal that is always 0 keeps all limits, too"]
 
 
 @pytest.mark.parametrize(("sent", "is_kept"), [(0.3, True), (0.29999998, True), (0.30000004, False)])
-@pytest.mark.parametrize("limit", [{"mean": 0.3}, {"distance": 0.3}, {"band": 0.3, "frame_share": 1.0}])
+@pytest.mark.parametrize("limit", [{"max_mean": 0.3}, {"max_distance": 0.3}, {"band": 0.3, "min_frame_share": 1.0}])
 def test_singles_are_compared_by_what_they_are_exact_to(limit: dict[str, float], sent: float, is_kept: bool) -> None:
-    it = judge(SignalLimits(exact=SINGLE, **limit), Target(np.array([0, 10 * SECOND]), np.zeros(2)))  # type: ignore[arg-type]
+    it = judge(limits(exact=SINGLE, **limit), Target(np.array([0, 10 * SECOND]), np.zeros(2)))
     hear(it, *[(step / 10, float(np.float32(sent))) for step in range(101)])
     verdict = decided(it)
     assert (verdict.outcome == "passed") == is_kept
     if sent == 0.3 and "band" not in limit:
-        assert values(verdict)[next(iter(limit))] == 0.3
+        assert values(verdict)[next(iter(limit)).removeprefix("max_")] == 0.3
 
 
 def test_times_of_another_clock_are_told_by_their_date() -> None:
-    it = judge(SignalLimits(delay=SECOND))
+    it = judge(limits(max_delay=1))
     it.arrived = BEGIN
     it.take(0.5, 1_746_700_000_000_000)
     assert (

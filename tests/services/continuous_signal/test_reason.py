@@ -6,16 +6,17 @@ import pytest
 from services.continuous_signal.measures import LateFacts, RepeatedValue, SignalLimits, SignalMeasures, WorstSample
 from services.continuous_signal.model import verdict
 from services.continuous_signal.target import Target
+from tests.services.continuous_signal.test_model import limits
 
 TARGET = Target(np.array([0, 10_000_000]), np.array([0.0, 1.0]))
 GOOD = SignalMeasures(
     12, 12, 0, (), mean=0.01, std=0.02, distance=0.3, share=0.9, worst=WorstSample(12.3, 0.1, 0.4), mean_over_time=0.01
 )
-LIMITS = SignalLimits(mean=0.05, band=0.1, share=0.8, samples=10)
+LIMITS = limits(max_mean=0.05, band=0.1, min_share=0.8, min_samples=10)
 
 
-def reason(measures: SignalMeasures, limits: SignalLimits = LIMITS) -> str:
-    return verdict("speed", TARGET, measures, limits, "within 9.00 s", LateFacts()).reason
+def reason(measures: SignalMeasures, limited: SignalLimits = LIMITS) -> str:
+    return verdict("speed", TARGET, measures, limited, "within 9.00 s", LateFacts()).reason
 
 
 def test_over_time_is_told_only_where_it_says_more() -> None:
@@ -41,8 +42,8 @@ def test_without_samples_the_reason_is_why(measures: SignalMeasures, text: str) 
 
 def test_a_lag_and_a_value_that_stays_are_named() -> None:
     bad = replace(GOOD, lag=0.3, repeats=RepeatedValue(7, 0.05, 2.0), likeness="about 2 times its target")
-    limits = SignalLimits(mean=0.05, lag=0.15, repeats=4)
-    assert reason(bad, limits) == (
+    limited = limits(max_mean=0.05, max_lag=0.15, max_repeats=4)
+    assert reason(bad, limited) == (
         "it lags its target by 0.3 s (at most 0.15 s); 7 samples in a row have the same value, 0.05, from 2.00 s on "
         "(at most 4); worst at 12.30 s: 0.1 with a target of 0.4"
     )
