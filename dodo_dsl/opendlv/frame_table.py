@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dodo_dsl.opendlv import message_columns, wire
 from dodo_dsl.opendlv.address import HEADER_BYTES, MAGIC, FrameError
 from dodo_dsl.opendlv.envelope import LAYOUT, decode_frame, decode_parts, encode_frame
-from dodo_dsl.opendlv.message_columns import Marks, Numbers
+from dodo_dsl.opendlv.message_columns import Numbers
 
 PADDING = bytes(128)  # what a reader of the last frame may look at beyond it
 FEW = 16
@@ -43,39 +43,38 @@ def read_frames(data: bytes, starts: list[int], ends: list[int], known: bool = F
 
     ``known`` frames were read before.
     """
-    if len(starts) < FEW:
-        return np.array(_one_by_one(data, starts, ends, known), np.int64).reshape(-1, len(Fact)).T
-    table, usual = _at_once(data, np.array(starts, np.int64), np.array(ends, np.int64))
-    for row in np.flatnonzero(~usual).tolist():
-        found = _one_by_one(data, starts[row : row + 1], ends[row : row + 1], known)
-        if not found:
+    table, left = np.empty((len(Fact), len(starts)), np.int64), list(range(len(starts)))
+    if len(starts) >= FEW:
+        table, left = _at_once(data, np.array(starts, np.int64), np.array(ends, np.int64))
+    for row in left:
+        found = _one(data, starts[row], ends[row], known)
+        if found is None:
             return table[:, :row]
-        table[:, row] = found[0]
+        table[:, row] = found
     return table
 
 
-def _one_by_one(data: bytes, starts: list[int], ends: list[int], known: bool) -> list[tuple[int, ...]]:
-    rows: list[tuple[int, ...]] = []
-    for start, end in zip(starts, ends, strict=True):
-        at = start + HEADER_BYTES
-        try:
-            for _ in islice(wire.chunks(memoryview(data)[at:end]), FEW):
-                pass  # a false header may claim 16 MiB, and those are not copied
-            kind, payload, times, stamp = decode_parts(data[at:end])
-        except (FrameError, wire.WireError):
-            break
-        if not known and _is_doubtful(data, start, end):
-            break
-        at = data.find(payload, at, end)
-        rows.append((start, end, kind, at, at + len(payload), *times, stamp))
-    return rows
-
-
-def _at_once(data: bytes, starts: Numbers, ends: Numbers) -> tuple[Table, Marks]:
+def _at_once(data: bytes, starts: Numbers, ends: Numbers) -> tuple[Table, list[int]]:
+    """All rows, and which of them are left as their frames are not as libcluon writes them."""
     reader = message_columns.Reader(data, ends)
     at = reader.message(LAYOUT, starts + HEADER_BYTES)
     kind, payload, *others = (values for _, _, values in reader.columns)
-    return np.array([starts, ends, kind, *payload, *others], np.int64), reader.usual & (at == ends)
+    table = np.array([starts, ends, kind, *payload, *others], np.int64)
+    return table, np.flatnonzero(~(reader.usual & (at == ends))).tolist()
+
+
+def _one(data: bytes, start: int, end: int, known: bool) -> tuple[int, ...] | None:
+    at = start + HEADER_BYTES
+    try:
+        for _ in islice(wire.chunks(memoryview(data)[at:end]), FEW):
+            pass  # a false header may claim 16 MiB, and those are not copied
+        kind, payload, times, stamp = decode_parts(data[at:end])
+    except (FrameError, wire.WireError):
+        return None
+    if not known and _is_doubtful(data, start, end):
+        return None
+    at = data.find(payload, at, end)
+    return start, end, kind, at, at + len(payload), *times, stamp
 
 
 def _is_doubtful(data: bytes, start: int, end: int) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 
 from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.frame_decoder import FrameDecoder, packet_of
+from dodo_dsl.opendlv.frame_decoder import FrameDecoder, image_of
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError
 from dodo_dsl.opendlv.recording import Recording
@@ -72,10 +72,7 @@ class BagExport:
 
     def _topics(self, there: list[tuple[int, int]], images: Numbers) -> Iterator[Topic]:
         """Those of which there are all messages, or of detections any; ``there`` are ids with their senders."""
-        sizes = [
-            CameraView(width=each.width, height=each.height)
-            for each in map(packet_of, self._recording.envelopes(images))
-        ]
+        sizes = [CameraView(width=i.width, height=i.height) for i in map(image_of, self._recording.envelopes(images))]
         camera = next((each for each in sizes if each.width and each.height), None)
         known = set(self._messages.names())  # set 0.9 lacks some
         for name, (type_, messages) in WRITTEN.items():
@@ -117,13 +114,13 @@ class BagExport:
         """A JPEG stays as it is, others are decoded."""
         time, topic = _time(envelope), Topic(topic=f"{camera}/image_raw", type=IMAGE_TYPE, bus=())
         try:
-            packet = packet_of(envelope)
-            if CODECS.get(packet.format) == "mjpeg":
+            image = image_of(envelope)
+            if CODECS.get(image.format) == "mjpeg":
                 topic = Topic(topic=f"{topic.topic}/compressed", type=COMPRESSED, bus=())
-                data = {"format": "jpeg", "data": np.frombuffer(packet.data, np.uint8)}
+                data = {"format": "jpeg", "data": np.frombuffer(image.data, np.uint8)}
                 fields = self._types.given_header(topic, time) | data
             else:
-                if (frame := self._decoder.decode(packet)) is None:
+                if (frame := self._decoder.decode(envelope)) is None:
                     raise VideoError("a packet cannot be decoded")
                 fields = self._types.given(topic, {}, time, CameraPicture(frame.pixels("bgr"), "bgr"))
             self._write(topic, time, fields)

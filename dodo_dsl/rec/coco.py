@@ -81,12 +81,12 @@ class DataSet:
         """Writes the frames with labels, whose names begin with ``prefix``; raises FramesError and OSError."""
         names = frame_names(recording, images, picture_type)
         (folder / "images").mkdir(parents=True, exist_ok=True)
-        for number, packet, frame in frames(recording, images, progress, problem):
-            if boxes := self.cut_boxes(labels.get(packet.sample_time, ()), frame.width, frame.height):
+        for number, envelope, frame in frames(recording, images, progress, problem):
+            if boxes := self.cut_boxes(labels.get(envelope.sample_time, ()), frame.width, frame.height):
                 path, id_ = f"images/{prefix}{names[number]}", len(self.images) + 1
                 write_picture(folder / path, frame)
                 image = {"id": id_, "file_name": path, "width": frame.width, "height": frame.height}
-                image["sample_time"] = packet.sample_time
+                image["sample_time"] = envelope.sample_time
                 self.images.append(image | ({"recording": str(recording.path)} if prefix else {}))
                 self.boxes += [(id_, box) for box in boxes]
 

@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from dodo_dsl.opendlv.address import IMAGE
-from dodo_dsl.opendlv.frame_decoder import FrameDecoder, Packet, packet_of
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.frame_decoder import FrameDecoder
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.video import DecodedFrame, VideoError
@@ -38,18 +39,18 @@ def images_of(recording: Recording, rows: Numbers, camera: int | None) -> Number
 
 def decoded(
     recording: Recording, rows: Numbers, problem: Callable[[str], None]
-) -> Iterator[tuple[Packet, DecodedFrame | None]]:
-    """The packet of each image message with its frame; ``problem`` gets a sentence per reason for one without."""
+) -> Iterator[tuple[Envelope, DecodedFrame | None]]:
+    """Each image message with its frame; ``problem`` gets a sentence per reason for one without."""
     decoder, reasons = FrameDecoder(), set[str]()
-    for packet in map(packet_of, recording.envelopes(rows)):
+    for envelope in recording.envelopes(rows):
         frame = None
         try:
-            frame = decoder.decode(packet)
+            frame = decoder.decode(envelope)
         except VideoError as error:
             if str(error) not in reasons and len(reasons) < MOST_REASONS:
                 reasons.add(str(error))
                 problem(str(error))
-        yield packet, frame
+        yield envelope, frame
     if early := decoder.early:
         come = "packet comes" if early == 1 else "packets come"
         problem(f"{early} {come} before the first key frame, and so cannot be decoded")
@@ -57,17 +58,17 @@ def decoded(
 
 def frames(
     recording: Recording, images: Numbers, progress: Callable[[int], None], problem: Callable[[str], None]
-) -> Iterator[tuple[int, Packet, DecodedFrame]]:
+) -> Iterator[tuple[int, Envelope, DecodedFrame]]:
     """The frames that can be decoded, each with its number among ``images``; raises FramesError if there is none.
 
     ``progress`` gets how many packets are done, ``problem`` sentences on those without a frame.
     """
     lost = 0
-    for number, (packet, frame) in enumerate(decoded(recording, images, problem)):
+    for number, (envelope, frame) in enumerate(decoded(recording, images, problem)):
         if frame is None:
             lost += 1
         else:
-            yield number, packet, frame
+            yield number, envelope, frame
         progress(number + 1)
     if lost == len(images):
         raise FramesError(f"no frame of {recording.path} can be decoded")

@@ -35,14 +35,14 @@ def write_video(
     stream: Any = None
     try:
         with av.open(str(place), "w", format="mp4", options={"movflags": "+faststart"}) as container:
-            for _, packet, frame in frames(recording, images, progress, problem):
+            for _, envelope, frame in frames(recording, images, progress, problem):
                 if stream is None:
-                    size, last = (frame.width, frame.height), packet.sample_time
+                    size, last = (frame.width, frame.height), envelope.sample_time
                     stream = _stream(container, *size)
                 else:
                     _refuse_other(frame, *size)
-                    shown += min(max(packet.sample_time - last, 1), MOST_GAP)
-                    last = max(packet.sample_time, last + 1)
+                    shown += min(max(envelope.sample_time - last, 1), MOST_GAP)
+                    last = max(envelope.sample_time, last + 1)
                 picture = av.VideoFrame.from_ndarray(frame.pixels("bgr"), format="bgr24")
                 picture.pts, picture.time_base = shown, _MICROSECOND
                 container.mux(stream.encode(picture))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.frame_decoder import FrameDecoder, packet_of
+from dodo_dsl.opendlv.frame_decoder import FrameDecoder
 from dodo_dsl.opendlv.frame_table import Fact
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.recording import Recording
@@ -37,7 +37,7 @@ def first_frame(recording: Recording, rows: Numbers) -> DecodedFrame:
     decoder, fault = FrameDecoder(), None
     for envelope in recording.envelopes(rows):
         try:
-            if (frame := decoder.decode(packet_of(envelope))) is not None:
+            if (frame := decoder.decode(envelope)) is not None:
                 return frame
         except VideoError as error:
             fault = fault or error
@@ -114,7 +114,7 @@ class EntryStream:
 
     def _decoded(self, envelope: Envelope) -> RecordedPicture | None:
         try:
-            frame = self.decoder.decode(packet_of(envelope))
+            frame = self.decoder.decode(envelope)
         except VideoError:
             return None
         return pixels(frame) if frame is not None else None

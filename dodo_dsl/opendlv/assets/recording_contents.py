@@ -68,13 +68,10 @@ def _contents(path: Path, _changed_ns: int) -> Contents:
 
 
 def _picture(recording: "Recording") -> tuple[int, int]:
-    from dodo_dsl.opendlv.message_set import MessageError, MessageSet
+    from dodo_dsl.opendlv.frame_decoder import image_of
 
-    try:
-        image = MessageSet.standard().decode(IMAGE, recording.envelope(int(recording.rows([IMAGE])[0])).payload)
-    except (IndexError, MessageError):
-        return 0, 0
-    return image.width, image.height
+    images = map(image_of, recording.envelopes(recording.rows([IMAGE])[:1]))
+    return next(((image.width, image.height) for image in images), (0, 0))
 
 
 def picture_size(path: Path) -> tuple[int, int]:
