@@ -3,7 +3,7 @@
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,26 +29,39 @@ class Taken(NamedTuple):
 
 
 class RecordedCamera:
-    """One memory's pictures, encoded; `sender_stamp` distinguishes the memories of a recording.
+    """One memory's pictures, each given to ``store``; ``sender`` distinguishes the memories of a recording.
 
-    ``encoder`` makes a VideoEncoder of a format, width and height.
+    ``encoder`` makes a VideoEncoder of a format, width and height. Where pictures are not ``required``, what cannot be
+    encoded is logged, and ends them.
     """
 
-    def __init__(self, source: PictureSource, encoder: Callable[[str, int, int], VideoEncoder], sender: int) -> None:
-        self._source, self._new_encoder = source, encoder
+    def __init__(
+        self,
+        source: PictureSource,
+        encoder: Callable[[str, int, int], VideoEncoder],
+        sender: int,
+        store: "Store",
+        required: bool = True,
+    ) -> None:
+        self._source, self._new_encoder, self._store, self._required = source, encoder, store, required
         self._messages, self._sender_stamp = MessageSet.standard(), sender
-        self._count = 0
+        self._count, self._is_on = 0, True
         self._layout = ("", 0, 0)
         self._encoder: VideoEncoder | None = None
 
-    def take(self, now: int) -> Taken | None:
-        """A new picture, if there is one; raises SourceError."""
-        taken = self._source.take(now)
-        if taken is None:
-            return None
-        data, sample_time = taken
-        layout = self._source.spec.layout(len(data))
-        return Taken(pixels.view(data, *layout), layout, sample_time, time.time_ns() // 1000)
+    def update(self, now: int) -> None:
+        """Take a new picture at ``now``, in us, if there is one; raises SourceError and VideoError."""
+        try:
+            if self._is_on and (taken := self._source.take(now)):
+                layout = self._source.spec.layout(len(taken[0]))
+                picture = pixels.view(taken[0], *layout)
+                self._store(self, Taken(picture, layout, taken[1], time.time_ns() // 1000))
+        except (SourceError, VideoError) as error:
+            if self._required:
+                raise
+            _log.warning("no pictures are recorded: %s", error)
+            self._is_on = False
+            self.close()
 
     def envelope(self, taken: Taken) -> Envelope:
         """The message of a picture, which follows the one before in the video; raises VideoError."""
@@ -107,34 +120,6 @@ class Later:
         camera, taken = self._waiting.popleft()
         self._size -= taken.picture.nbytes
         self._write(camera.envelope(taken))
-
-
-class Cameras:
-    """All memories that are recorded: each picture goes to `store`.
-
-    Where pictures are not ``required``, a camera whose pictures cannot be encoded is logged and left out.
-    """
-
-    def __init__(self, cameras: Sequence[RecordedCamera], store: Store, required: bool = True) -> None:
-        self._cameras, self._store, self._required = list(cameras), store, required
-
-    def update(self, now: int) -> None:
-        """Take what is there at `now`, microseconds."""
-        for camera in tuple(self._cameras):
-            try:
-                if taken := camera.take(now):
-                    self._store(camera, taken)
-            except (SourceError, VideoError) as error:
-                if self._required:
-                    raise
-                _log.warning("no pictures are recorded: %s", error)
-                self._cameras.remove(camera)
-                camera.close()
-
-    def close(self) -> None:
-        """Detach from all memories."""
-        for camera in self._cameras:
-            camera.close()
 
 
 class Snapshot:

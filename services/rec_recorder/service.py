@@ -9,10 +9,10 @@ from services.base import Context, Service
 from services.base.lockstep_clock import RECORDING_END
 from services.base.service import period_of
 from services.rec_recorder.model import NewestPictures, RecordingFile, Traffic
-from services.rec_recorder.source import PictureSource, parse
+from services.rec_recorder.source import MemorySpec, PictureSource, parse
 
 if TYPE_CHECKING:
-    from services.rec_recorder.pictures import Cameras, Snapshot
+    from services.rec_recorder.pictures import RecordedCamera, Snapshot
 
 LOOKS_HZ, SNAPSHOT_LOOKS_HZ = 200.0, 20.0
 """Times a second at most that memories are looked at."""
@@ -32,11 +32,11 @@ class Recorder(Service):
     has_begun = False
 
     def __init__(
-        self, recording: RecordingFile, cameras: "Cameras | None", snapshot: "Snapshot | None", looks_hz: float
+        self, recording: RecordingFile, cameras: "list[RecordedCamera]", snapshot: "Snapshot | None", looks_hz: float
     ) -> None:
         self.observe = recording.write
         self._snapshot = snapshot
-        self._cameras = [each for each in (cameras, snapshot) if each is not None]
+        self._cameras: list[RecordedCamera | Snapshot] = [*cameras, *([snapshot] if snapshot else [])]
         if self._cameras:
             self.period = period_of(looks_hz)
 
@@ -64,12 +64,10 @@ def build(context: Context) -> Service:
     context.resources.callback(recording.close)
     if context.session is not None:
         context.session.gather(GATHERS)
-    cameras = snapshot = None
-    if flags["frames"]:
-        period = round(period_of(flags["frames"]))
-        sources = [PictureSource(memory, period, is_stepped=context.clock.relays) for memory in memories]
-        cameras = _cameras(context, sources, recording)
-        context.resources.callback(cameras.close)
+    cameras = _cameras(context, memories, recording) if flags["frames"] else []
+    for camera in cameras:
+        context.resources.callback(camera.close)
+    snapshot = None
     if flags["snapshot"]:
         from services.rec_recorder.pictures import Snapshot
 
@@ -108,10 +106,10 @@ def _end(recorder: Recorder, recording: RecordingFile, context: Context) -> None
         recording.write(Envelope(context.messages.id(RECORDING_END), b"", now, 0, now, 0))
 
 
-def _cameras(context: Context, sources: list[PictureSource], recording: RecordingFile) -> "Cameras":
+def _cameras(context: Context, memories: list[MemorySpec], recording: RecordingFile) -> "list[RecordedCamera]":
     """Pictures in the recording, or in one of their own, of which the newest stay."""
     from dodo_dsl.opendlv.video import VideoEncoder
-    from services.rec_recorder.pictures import Cameras, Later, RecordedCamera
+    from services.rec_recorder.pictures import Later, RecordedCamera, Store
 
     flags = context.flags
     encoder = partial(
@@ -121,11 +119,14 @@ def _cameras(context: Context, sources: list[PictureSource], recording: Recordin
         lossless=flags["lossless"],
         fast=bool(flags["pictures"]),
     )
-    cameras = [RecordedCamera(source, encoder, flags["id"] + number) for number, source in enumerate(sources)]
-    if not flags["pictures"]:
-        return Cameras(cameras, lambda camera, taken: recording.write(camera.envelope(taken)))
-    newest = NewestPictures(Path(flags["pictures"]), round(flags["pictures-size"] * MEGABYTE))
-    context.resources.callback(newest.close)
-    later = Later(newest.write, lambda: newest.is_wanted, WAITING)
-    context.resources.callback(later.close)
-    return Cameras(cameras, later.add, required=False)
+    store: Store = lambda camera, taken: recording.write(camera.envelope(taken))  # noqa: E731
+    if flags["pictures"]:
+        newest = NewestPictures(Path(flags["pictures"]), round(flags["pictures-size"] * MEGABYTE))
+        context.resources.callback(newest.close)
+        later = Later(newest.write, lambda: newest.is_wanted, WAITING)
+        context.resources.callback(later.close)
+        store = later.add
+    period, required = round(period_of(flags["frames"])), not flags["pictures"]
+    sources = [PictureSource(memory, period, is_stepped=context.clock.relays) for memory in memories]
+    senders = enumerate(sources, flags["id"])
+    return [RecordedCamera(source, encoder, sender, store, required) for sender, source in senders]

@@ -17,10 +17,10 @@ from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.recording_times import DAY
 from services.base import Context, Service
 from services.base.loop import TEST_BEGIN
-from services.base.pictures import memories
+from services.base.pictures import Memories, memories, show
 from services.base.service import Framed, Output, period_of
 from services.rec_replay.selection import Part, Player, SelectionError, select
-from services.rec_replay.stream import EntryStream, PictureMemories, first_frame
+from services.rec_replay.stream import EntryStream, Pictures, first_frame
 
 LOOKS_HZ = 1000.0
 LARGEST_FRAME = 65_480
@@ -44,7 +44,7 @@ class Replay(Service):
         self,
         player: Player,
         stream: EntryStream,
-        memories: PictureMemories | None,
+        memories: Memories,
         messages: MessageSet,
         shifts: bool,
         settle: int,
@@ -53,7 +53,7 @@ class Replay(Service):
         self._player, self._stream, self._memories = player, stream, memories
         self._status, self._not_shown = messages.type(STATUS), messages.type(NOT_SHOWN)
         self._shifts, self._settle = shifts, settle
-        self._too_large = self._lost = self._round = 0
+        self._too_large = self._lost = self._misfits = self._round = 0
         self._reported = -STATUS_PERIOD
         self._end: int | None = None
         self._pictures = np.flatnonzero(stream.shown if stream.shown.any() else np.ones_like(stream.shown))
@@ -72,16 +72,16 @@ class Replay(Service):
         together: list[Framed] = []
         while (taken := player.take()) is not None:
             entry, due = taken
-            memories = self._memories if self._memories and self._stream.shown[entry] else None
-            if together and (memories or len(together) == MOST_TOGETHER):  # before its picture is decoded
+            is_shown = self._memories and self._stream.shown[entry]
+            if together and (is_shown or len(together) == MOST_TOGETHER):  # before its picture is decoded
                 yield together
                 together = []
             envelope, frame, is_sent, picture = self._stream.take()
             too_large = len(frame) > LARGEST_FRAME
             if self._shifts:
                 envelope, frame = envelope._replace(sent=due, sample_time=due), b""
-            if memories and (picture is None or not memories.show(picture, envelope.sample_time)):
-                yield Output(self._missed(entry, due, memories.misfits), 0, due)
+            if is_shown and not self._show(picture, envelope.sample_time):
+                yield Output(self._missed(entry, due), 0, due)
             if is_sent and too_large:
                 self._too_large += 1
             elif is_sent:
@@ -99,6 +99,13 @@ class Replay(Service):
                 state=_PLAYING, numberOfEntries=len(self._stream.times), currentEntryForPlayback=player.position
             )
             yield Output(status, 0)
+
+    def _show(self, picture: Pictures | None, sample_time: int) -> bool:
+        if picture is None or picture[0].nbytes != self._memories[0][0].size:
+            self._misfits += picture is not None
+            return False
+        show(self._memories, *picture, sample_time)
+        return True
 
     def _next_picture(self, now: int) -> int:
         """The time of the update that shows the next picture or message, 0 when there is none or that is unknown."""
@@ -119,10 +126,8 @@ class Replay(Service):
         """Log what could not be played."""
         if self._too_large:
             _log.warning("%d messages were not sent: they are too large for the bus", self._too_large)
-        if self._memories is not None:
-            _log.info("%d pictures were shown", self._memories.shown)
 
-    def _missed(self, entry: int, due: int, misfits: int) -> Message:
+    def _missed(self, entry: int, due: int) -> Message:
         """The message that a picture was not shown, and until when: evaluators expect no answer to it."""
         number, times, next_due = int(np.searchsorted(self._pictures, entry)), self._stream.times, self._next_due()
         until = due + DAY if next_due is None else next_due
@@ -130,7 +135,7 @@ class Replay(Service):
         later = self._pictures[number + 1 :][:1]
         length = until - due if self._shifts or not len(later) else int(times[later[0]]) - sampled
         self._lost, early = self._lost + 1, self._stream.decoder.early
-        reasons = {"before the first key frame": early, "of another size than the first": misfits}
+        reasons = {"before the first key frame": early, "of another size than the first": self._misfits}
         why = (f", {count} of them {reason}" for reason, count in reasons.items() if count)
         self.notes = [f"{self._lost} frames could not be shown{''.join(why)}"]
         missed: Message = self._not_shown(number=number, sampled=sampled, sampledUntil=sampled + length, dueUntil=until)
@@ -187,22 +192,22 @@ def _part(context: Context, recording: Recording) -> Part:
     return part
 
 
-def _memories(context: Context, recording: Recording, part: Part) -> PictureMemories | None:
-    """Memories for the pictures; None if there are none to show."""
+def _memories(context: Context, recording: Recording, part: Part) -> Memories:
+    """Those for the pictures, that in argb first; none if there are none to show."""
     flags = context.flags
     if not flags["video"]:
-        return None
+        return ()
     if not part.shown.any():
         _refuse_other_senders(recording, flags["video-sender"])
         _log.warning("%s has no pictures in the selected part: no shared memory is created", recording.path)
-        return None
+        return ()
     frame = first_frame(recording, part.rows[part.shown])
     width, height = frame.width, frame.height
     formats: tuple[str, ...] = pixels.FORMATS
     if width % 2 or height % 2:
         _log.warning("pictures of %d x %d pixels cannot be converted to I420", width, height)
         formats = tuple(kind for kind in formats if kind != "i420")
-    return PictureMemories(memories(context, width, height, formats))
+    return memories(context, width, height, formats)
 
 
 def _refuse_other_senders(recording: Recording, sender: int) -> None:

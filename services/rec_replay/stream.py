@@ -1,35 +1,23 @@
-"""The entries of a part in order, read in blocks; pictures decoded ahead and put into shared memory."""
+"""The entries of a part in order, read in blocks; pictures decoded ahead."""
 
-import logging
 from collections.abc import Iterator
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.frame_decoder import FrameDecoder
 from dodo_dsl.opendlv.frame_table import Fact
 from dodo_dsl.opendlv.message_columns import Numbers
+from dodo_dsl.opendlv.pixels import Picture
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.video import DecodedFrame, VideoError
-from services.base.pictures import Memories, show
 from services.rec_replay.selection import Part
 
-_log = logging.getLogger(__name__)
+Pictures = tuple[Picture, Picture | None]
+"""A frame as B, G, R, A (height, width, 4) and as I420 (height * 3 / 2, width; None for odd sizes)."""
 
 
-class RecordedPicture(NamedTuple):
-    """A picture as B, G, R, A (height, width, 4) and as I420 (height * 3 / 2, width; None for odd sizes)."""
-
-    argb: NDArray[np.uint8]
-    i420: NDArray[np.uint8] | None
-
-
-def pixels(frame: DecodedFrame) -> RecordedPicture:
-    """The picture in both formats of a camera."""
+def pictures(frame: DecodedFrame) -> Pictures:
     even = frame.width % 2 == 0 and frame.height % 2 == 0
-    return RecordedPicture(frame.pixels("argb"), frame.pixels("i420") if even else None)
+    return frame.pixels("argb"), frame.pixels("i420") if even else None
 
 
 def first_frame(recording: Recording, rows: Numbers) -> DecodedFrame:
@@ -47,30 +35,9 @@ def first_frame(recording: Recording, rows: Numbers) -> DecodedFrame:
     raise VideoError(f"none of the {len(rows)} pictures in {recording.path} can be decoded{why}")
 
 
-class PictureMemories:
-    """Memories for pictures. A picture of another size than the first is skipped, and counted in ``misfits``."""
-
-    def __init__(self, memories: Memories) -> None:
-        """Each memory with the format of its pictures, that in argb first."""
-        self.shown = self.misfits = 0
-        self._memories = memories
-
-    def show(self, picture: RecordedPicture, sample_time: int) -> bool:
-        """Publish a picture, if it has the size; raises SharedMemoryError when a reader keeps the lock."""
-        if picture.argb.nbytes != self._memories[0][0].size:
-            if not self.misfits:
-                _log.warning("skipped the picture of %d us, which has another size than the first", sample_time)
-            self.misfits += 1
-            return False
-        show(self._memories, *picture, sample_time)
-        self.shown += 1
-        return True
-
-
 READ_AHEAD = 256
 
-
-Entry = tuple[Envelope, bytes, bool, RecordedPicture | None]
+Entry = tuple[Envelope, bytes, bool, Pictures | None]
 """A message, its frame as recorded, whether it is sent, and its picture if it is shown and could be decoded."""
 
 
@@ -112,9 +79,9 @@ class EntryStream:
                 for envelope, frame, (sent, shown) in zip(batch.envelopes(), batch.frames(), marks, strict=False):
                     yield envelope, frame, sent, self._decoded(envelope) if shown else None
 
-    def _decoded(self, envelope: Envelope) -> RecordedPicture | None:
+    def _decoded(self, envelope: Envelope) -> Pictures | None:
         try:
             frame = self.decoder.decode(envelope)
         except VideoError:
             return None
-        return pixels(frame) if frame is not None else None
+        return pictures(frame) if frame is not None else None

@@ -172,9 +172,7 @@ def test_every_picture_of_the_track(cid: int, tmp_path: Path, shared_data: Calla
         send(session, "dodo.TestBegin")
         assert until_end(session) == []
         process.terminate()
-        errors = process.communicate(timeout=PATIENCE)[1]
-    assert "591 pictures were shown" in errors
-    assert "could not be decoded" not in errors
+        assert "could not be" not in process.communicate(timeout=PATIENCE)[1]
 
 
 @pytest.mark.parametrize(("times", "zero"), [("recorded", T0), ("test", BEGIN)])

@@ -1,16 +1,12 @@
-import os
-from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dodo_dsl.opendlv.message_set import MessageSet
-from dodo_dsl.opendlv.pixels import FORMATS, size
 from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.rec_replay.selection import select
-from services.rec_replay.stream import EntryStream, PictureMemories, first_frame, pixels
+from services.rec_replay.stream import EntryStream
 from tests.services.rec_replay.recordings import IMAGE, S, images, message, picture, write
 
 
@@ -33,7 +29,7 @@ def shown(one: EntryStream) -> list[int | None]:
             _, _, _, played = one.take()
         except StopIteration:
             return numbers
-        found = [n for n in range(10) if played and np.array_equal(played.i420, picture(n))]
+        found = [n for n in range(10) if played and np.array_equal(np.asarray(played[1]), picture(n))]
         numbers.append(found[0] if found else None)
 
 
@@ -55,20 +51,3 @@ def test_pictures_that_cannot_be_decoded_are_counted(tmp_path: Path) -> None:
         one = stream(recording)
         assert shown(one) == [None, None, 4, 5, None]
         assert one.decoder.early == 2
-
-
-def test_memories_are_in_their_formats(path: Path) -> None:
-    with ExitStack() as held, Recording(path) as recording:
-        one = pixels(first_frame(recording, np.arange(10)))
-        wide, high = one.argb.shape[1], one.argb.shape[0]
-        sizes = {kind: size(kind, wide, high) for kind in FORMATS}
-        kept = {kind: SharedMemory.create(f"stream-{os.getpid()}.{kind}", sizes[kind]) for kind in FORMATS}
-        PictureMemories([(held.enter_context(memory), kind) for kind, memory in kept.items()]).show(one, 5)
-        found = {kind: bytes(memory.buffer[: sizes[kind]]) for kind, memory in kept.items()}
-        for memory in kept.values():
-            with memory.lock():
-                assert memory.sample_time() == 5
-    assert one.argb.std() > 10 and one.i420 is not None
-    assert (found["argb"], found["i420"]) == (one.argb.tobytes(), one.i420.tobytes())
-    assert found["bgr"] == one.argb[..., :3].tobytes()
-    assert found["rgb"] == one.argb[..., 2::-1].tobytes()
