@@ -64,8 +64,8 @@ class Failure:
             (n for n in range(number - 1, -1, -1) if self.line(n).strip() and self.line(n).strip()[0] != "#"), -1
         )
 
-    def wrong(self, line: int, column: int, message: str, hint: str, rule: str = "yaml-syntax") -> Diagnostic:
-        return Diagnostic(Span(self.file, line + 1, column + 1), rule, message, hint)
+    def wrong(self, line: int, column: int, message: str, hint: str) -> Diagnostic:
+        return Diagnostic(Span(self.file, line + 1, column + 1), "yaml-syntax", message, hint)
 
     def matched(self, number: int, pattern: _Pattern, at: int | None = None) -> Diagnostic | None:
         """What a pattern finds in a line, which has a NUL ``at`` the column where the parser gave up."""
@@ -108,9 +108,9 @@ def _blank(failure: Failure, above: int) -> Diagnostic | None:
         line = failure.line(number)
         if "\t" in line[: len(line) - len(line.lstrip())]:
             message = "this line is indented with a tab"
-            return failure.wrong(number, line.index("\t"), message, "indent with spaces", "yaml-tab")
+            return failure.wrong(number, line.index("\t"), message, "indent with spaces")
     if failure.line(row)[column:].startswith("\t"):
-        return failure.wrong(row, column, "a tab where a space is expected", "write a space", "yaml-tab")
+        return failure.wrong(row, column, "a tab where a space is expected", "write a space")
     for number in range(min(row, above), row + 1):
         if found := _FOREIGN.search(failure.line(number)):
             message = f"this blank is not a space (U+{ord(found['blank']):04X})"

@@ -53,7 +53,7 @@ def pages() -> dict[str, Page]:
     }
 
 
-def _page(name: str, group: str, summary: str, why: str, bad: str = "", driver: str = "", **more: str) -> Page:
+def _page(name: str, group: str, summary: str, why: str = "", bad: str = "", driver: str = "", **more: str) -> Page:
     """``driver`` are keys of the application's service."""
     compose = f"# docker-compose.yml\nservices:\n  driver: {{image: driver, {driver}}}" if driver else ""
     return Page(name, group, summary, why, "\n".join(filter(None, (bad, compose))), **more)
@@ -63,7 +63,7 @@ def text(page: Page) -> str:
     """A rule's page for a terminal."""
     parts = [f"{page.name}: {page.summary}", textwrap.fill(page.why, 100)]
     parts += ["This violates the rule:", textwrap.indent(page.bad, "    ")]
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(filter(None, parts)) + "\n"
 
 
 def markdown() -> str:
@@ -75,7 +75,7 @@ def _sections() -> Iterator[str]:
     for group, members in itertools.groupby(pages().values(), lambda page: page.group):
         yield f"\n## {group}"
         for page in members:
-            yield f"\n### {page.name}\n\n{page.summary}\n{page.why}\n"
+            yield "\n".join(["", f"### {page.name}", "", page.summary, *filter(None, [page.why]), ""])
             yield f"```yaml\n{page.bad}\n```"
     yield ""
 

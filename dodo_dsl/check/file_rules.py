@@ -33,7 +33,6 @@ def check_files(context: RuleContext) -> Iterator[Diagnostic]:
                 found = needed(argument.parameter, argument.value.path, context.spec.location.root)
                 if isinstance(found, str):
                     yield Diagnostic(argument.entry.key, "path-escape", found)
-                yield from _empty(argument, argument.value.path, argument.entry.value.span)
 
 
 def needed(parameter: Parameter, path: Path, root: Path) -> Mapping[str, Path] | str:
@@ -61,17 +60,6 @@ def files(path: Path, root: Path) -> Mapping[str, Path] | str:
         if len(found) > MAX_FILES or size > MAX_BYTES:
             return f"'{path.relative_to(root)}' holds more than {MAX_FILES} files or {MAX_BYTES >> 30} GiB"
     return found
-
-
-def _empty(argument: Argument, file: Path, span: Span) -> Iterator[Diagnostic]:
-    shown = f"{file.parent.name}/{file.name}"
-    for key in argument.parameter.not_empty:
-        try:
-            if not entries(file, key):
-                yield Diagnostic(span, "empty-file", f"{shown} has no {key}, so there is nothing to judge by")
-        except ValueError as error:
-            if not argument.parameter.format:  # which is reported with the file
-                yield Diagnostic(span, RULE, f"{shown}: {error}")
 
 
 def is_own(diagnostic: Diagnostic) -> bool:

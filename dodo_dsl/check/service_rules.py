@@ -31,14 +31,14 @@ def check_services(context: RuleContext) -> Iterator[Diagnostic]:
         if use.name == "sandbox" or use.name.startswith("dodo-"):
             message = f"the name '{use.name}' is reserved for DoDo's own services"
             hint = "choose another name; 'sandbox' and 'dodo-...' are reserved"
-            yield Diagnostic(use.span, "service-reserved", message, hint)
+            yield Diagnostic(use.span, "name-reserved", message, hint)
         if use.name in first_layer:
             message = f"the name '{use.name}' is already used in layer {first_layer[use.name]}"
-            yield Diagnostic(use.span, "service-taken", message, "the names of a test's services are unique")
+            yield Diagnostic(use.span, "name-taken", message, "the names of a test's services are unique")
         first_layer.setdefault(use.name, use.layer)
         if context.application and use.name in context.application.services:
             message = f"the application also has a service '{use.name}'"
-            yield Diagnostic(use.span, "service-taken", message, "rename the one in the test")
+            yield Diagnostic(use.span, "name-taken", message, "rename the one in the test")
 
 
 def check_parameters(context: RuleContext) -> Iterator[Diagnostic]:

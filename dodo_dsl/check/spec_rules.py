@@ -151,7 +151,7 @@ def check_until(context: RuleContext) -> Iterator[Diagnostic]:
     name, evaluators = context.spec.until, [use.name for use in context.spec.uses if use.layer == "evaluation"]
     if name and name not in evaluators and context.spec.is_whole:
         message = f"the test has no evaluator '{name}'"
-        yield Diagnostic(context.spec.span("until"), "unknown-evaluator", message, did_you_mean(name, evaluators))
+        yield Diagnostic(context.spec.span("until"), "unknown-name", message, did_you_mean(name, evaluators))
 
 
 def check_goals(context: RuleContext) -> Iterator[Diagnostic]:
@@ -163,7 +163,7 @@ def check_goals(context: RuleContext) -> Iterator[Diagnostic]:
 
 def _unknown_check(test: ResolvedTest, name: str, span: Span) -> Diagnostic:
     hint = did_you_mean(name, _units(test))
-    return Diagnostic(span, "unknown-check", f"no evaluator of the test has a check '{name}'", hint)
+    return Diagnostic(span, "unknown-name", f"no evaluator of the test has a check '{name}'", hint)
 
 
 _OF_THE_TEST = {
@@ -202,7 +202,7 @@ def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal | Diagnostic | No
     better = written["better"]
     if not (values["one"] < values["zero"] if better == "less" else values["one"] > values["zero"]):
         message = f"'one' is {written['one']}, expected {better} than 'zero', as {better} is better"
-        return Diagnostic(scalars["one"].span, "goal-values", message)
+        return Diagnostic(scalars["one"].span, "out-of-range", message)
     return Goal(name, **values, weight=float(written.get("weight", 1)))
 
 

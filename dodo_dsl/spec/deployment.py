@@ -13,13 +13,11 @@ from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, entries, part, path_of, plain, read
 from dodo_dsl.spec import rig
-from dodo_dsl.spec.manifest import MANIFEST
 from dodo_dsl.spec.registry import refuse_yaml
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.validation import schema_of_keys, valid_part, values
 
-_TAKEN = ("services", "dodo_dsl")
 _ROS = (".msg", ".idl")
 """The suffixes of files with types of ROS."""
 _ODVD_PLACE = re.compile(r"(?P<file>.+?):((?P<line>\d+):(?P<column>\d+):)? (?P<text>.+)", re.DOTALL)
@@ -173,7 +171,6 @@ class _Reading:
         )
         self._check_messages(found.messages)
         self._check_types(found.ros_types)
-        self._check_services(services)
         return found
 
     def _tell(self, span: Span, rule: str, message: str, hint: str = "", severity: Severity = "error") -> None:
@@ -235,17 +232,6 @@ class _Reading:
             Codec(files)
         except RosTypeError as error:
             self._tell(self.node.entries["messages"].key, "wrong-messages", str(error))
-
-    def _check_services(self, folders: dict[Path, Scalar]) -> None:
-        """Folders that are a service themselves, and that DoDo's packages hide."""
-        for folder, item in folders.items():
-            if (folder / MANIFEST).is_file():
-                hint = "name the folder above it, which holds a folder for each service"
-                self._tell(item.span, "service-folder", f"'{item.text}' is the folder of one service", hint)
-            elif folder.name in _TAKEN:
-                message = f"Python finds DoDo's own package '{folder.name}' before this folder"
-                hint = f"give it another name, such as my_{folder.name}, also in 'process' of its services"
-                self._tell(item.span, "service-folder", message, hint, "warning")
 
     def _rigs(self) -> dict[str, Rig]:
         rigs: dict[str, Rig] = {}

@@ -12,7 +12,7 @@ from pathlib import Path
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, shown_path
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, path_of, read
 from dodo_dsl.spec import matrix, vary
-from dodo_dsl.spec.matrix import MATRIX, Choice, Placeholders, without
+from dodo_dsl.spec.matrix import MATRIX, Choice, without
 from dodo_dsl.spec.model import LAYERS, Spec, spec_of
 from dodo_dsl.spec.registry import Location, near_path
 from dodo_dsl.spec.rig import KIND_TAGS, Rig
@@ -50,28 +50,26 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
 def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
     """The instances of a test that is merged over what it extends."""
     choices, found = matrix.choices(node)
-    of_matrix = list(matrix.PLACEHOLDERS.unknown(node, "matrix-unknown"))
-    of_ranges = list(vary.PLACEHOLDERS.unknown(node, "vary-unknown"))
-    found += of_matrix or matrix.PLACEHOLDERS.idle(node, "matrix-unused")
-    found += of_ranges or vary.PLACEHOLDERS.idle(node, "vary-unused")
+    of_matrix = list(matrix.PLACEHOLDERS.unknown(node))
+    of_ranges = list(vary.PLACEHOLDERS.unknown(node))
+    found += of_matrix or matrix.PLACEHOLDERS.idle(node)
+    found += of_ranges or vary.PLACEHOLDERS.idle(node)
     spans = {key: entry.value.span for key, entry in node.entries.items()}
-    are_alike, wrong, places = _only_in_parameters(node, matrix.PLACEHOLDERS), 0, None
-    specs: list[Spec] = []
+    wrong, specs = 0, list[Spec]()
     for choice in choices:
         if wrong >= _MOST_WRONG:
             break
         template = matrix.PLACEHOLDERS.filled(node, dict(choice.values))
         ranges, problems = vary.read(template)
         found += problems
-        if places is None or not are_alike:
-            instance = vary.PLACEHOLDERS.filled(template, vary.nominal(ranges))
-            _, problems, places = valid_part(instance if places is None else without(instance, MATRIX), "dodo")
-            found += [d for d in problems if is_whole or not _is_missing(d, node)]
-            wrong += bool(problems)
+        instance = vary.PLACEHOLDERS.filled(template, vary.nominal(ranges))
+        _, problems, places = valid_part(without(instance, MATRIX) if specs else instance, "dodo")
+        found += [d for d in problems if is_whole or not _is_missing(d, node)]
+        wrong += bool(problems)
         template = without_places(template, places)
         spec = Spec(location, choice=choice, spans=spans, is_whole=is_whole and not _hides_services(places))
         spec = _at(replace(spec, ranges=ranges, template=template), {})
-        corners, problems = _corners(spec)
+        corners, problems = _corners(spec, is_valid=not places)
         found += problems
         specs.append(replace(spec, corners=corners, template=template if ranges else None))
     return specs, found
@@ -203,15 +201,14 @@ def _at(spec: Spec, values: vary.Values) -> Spec:
     return replace(found, ranges=spec.ranges, template=spec.template)
 
 
-def _corners(spec: Spec) -> tuple[tuple[Spec, ...], list[Diagnostic]]:
-    """The spec at the ends of its ranges, and what its schema says of these."""
+def _corners(spec: Spec, *, is_valid: bool) -> tuple[tuple[Spec, ...], list[Diagnostic]]:
+    """The spec at the ends of its ranges, and of one that ``is_valid`` what its schema says of these."""
     corners, found = [], []
     if not spec.ranges or spec.template is None:
         return (), []
-    are_alike = not spec.is_whole or _only_in_parameters(spec.template, vary.PLACEHOLDERS)
     for values in vary.corners(spec.ranges):
         corner = replace(spec, choice=Choice((*spec.choice.values, *values.items())))
-        if not are_alike:
+        if is_valid:
             _, problems, places = valid_part(without(_instance(spec, values), MATRIX), "dodo")
             found += problems
             corner = replace(corner, template=without_places(spec.template, places))
@@ -222,18 +219,6 @@ def _corners(spec: Spec) -> tuple[tuple[Spec, ...], list[Diagnostic]]:
 def _is_missing(diagnostic: Diagnostic, node: Node) -> bool:
     """Whether a key is missing in the test itself, which the test that it extends may have."""
     return diagnostic.rule == "missing-key" and diagnostic.span == node.span
-
-
-def _only_in_parameters(node: Mapping, placeholders: Placeholders) -> bool:
-    """Whether all of these are under ``with``: rules check those values, so one instance's schema suffices."""
-    for key, entry in node.entries.items():
-        if key in LAYERS and isinstance(entry.value, Mapping):
-            for use in entry.value.entries.values():
-                if not isinstance(use.value, Mapping) or placeholders.names(without(use.value, "with")):
-                    return False
-        elif key not in (placeholders.key, MATRIX) and placeholders.names(entry.value):
-            return False
-    return True
 
 
 @dataclass(frozen=True)

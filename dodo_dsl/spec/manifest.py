@@ -97,8 +97,8 @@ class Parameter:
     of the service that it names. ``rig`` is the dotted key of the rig's setting that is the default; ``among`` names
     a path parameter and lists of its JSON file (``map-path.obstacles``), whose entries' names are the allowed values,
     and so are ``words``; ``within_timeout`` marks a duration that must be shorter than the test's timeout; one with
-    ``setup_times`` may pass that many times before the service is ready; ``not_empty`` names lists of a JSON file that
-    must not be empty; ``format`` shows what is in the file that a path names, which is checked as the service reads it;
+    ``setup_times`` may pass that many times before the service is ready;
+    ``format`` shows what is in the file that a path names, which is checked as the service reads it;
     an amount with ``or_share`` may be ``25 %``. Items of a list are strings, or numbers if ``of`` asks for them; it
     has as many of them as the list that ``per`` names, or one. It has an effect only ``when`` others are so. The
     messages that drive the vehicle take the place of the default of one that is ``driving``, and goals and gates of the
@@ -121,7 +121,6 @@ class Parameter:
     rig: str = ""
     among: str = ""
     words: tuple[str, ...] = ()
-    not_empty: tuple[str, ...] = ()
     format: str = ""
     within_timeout: bool = False
     setup_times: int = 0
@@ -203,7 +202,7 @@ class Manifest:
         return "/" not in self.image and ":" not in self.image
 
 
-_LISTS = ("choices", "words", "not-empty")
+_LISTS = ("choices", "words")
 
 
 def _read(name: str, raw: dict[str, Any]) -> Parameter:

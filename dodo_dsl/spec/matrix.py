@@ -12,6 +12,7 @@ from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, walk
 
 MATRIX = "matrix"
+_RULE = "unknown-placeholder"
 REPORTED = "\0"
 """The tag of values with a problem that is known already, which no file can have."""
 
@@ -43,30 +44,26 @@ class Placeholders:
 
     def names(self, node: Node) -> set[str]:
         """The names that placeholders below a node have."""
-        return {name for below in walk(node) for name in self.names_in(below)}
-
-    def names_in(self, node: Node) -> set[str]:
-        """The names that placeholders in a scalar have."""
-        text = node.text if isinstance(node, Scalar) and "${" in node.text else ""
-        return {match["name"] for match in self._one.finditer(text)}
+        texts = (below.text for below in walk(node) if isinstance(below, Scalar))
+        return {match["name"] for text in texts for match in self._one.finditer(text)}
 
     def used(self, node: Mapping) -> set[str]:
         """The names that a spec uses outside the key itself."""
-        return set[str]().union(*(self.names(entry.value) for key, entry in node.entries.items() if key != self.key))
+        return self.names(without(node, self.key))
 
     def _known(self, node: Mapping) -> dict[str, Entry]:
         written = node.get(self.key)
         return written.entries if isinstance(written, Mapping) else {}
 
-    def idle(self, node: Mapping, rule: str) -> Iterator[Diagnostic]:
+    def idle(self, node: Mapping) -> Iterator[Diagnostic]:
         """Names without placeholders, unless ranges come from an extended test."""
         used = self.used(node)
         for name, entry in self._known(node).items():
             if name not in used and (self.key == MATRIX or entry.key.file == node.span.file):
                 message = f"nothing uses ${{{self.key}.{name}}}, so that its values change nothing"
-                yield Diagnostic(entry.key, rule, message, severity="warning")
+                yield Diagnostic(entry.key, "unused-placeholder", message, severity="warning")
 
-    def unknown(self, node: Mapping, rule: str) -> Iterator[Diagnostic]:
+    def unknown(self, node: Mapping) -> Iterator[Diagnostic]:
         """Placeholders of a spec with names that are not known, or without one."""
         known = self._known(node)
         values = (entry.value for key, entry in node.entries.items() if key != self.key)
@@ -76,10 +73,10 @@ class Placeholders:
                 right = f"${{{self.key}.{name if name in known else 'light'}}}"
                 if not self._one.fullmatch(attempt[0]):
                     message = f"'{attempt[0][:60]}' is not a placeholder, expected one such as {right}"
-                    yield Diagnostic(scalar.span, rule, message, f'write "{right}"' if name in known else "")
+                    yield Diagnostic(scalar.span, _RULE, message, f'write "{right}"' if name in known else "")
                 elif name not in known:
                     hint = did_you_mean(name, known) if known else self.advice
-                    yield Diagnostic(scalar.span, rule, f"'{self.key}' has no '{name}'", hint)
+                    yield Diagnostic(scalar.span, _RULE, f"'{self.key}' has no '{name}'", hint)
 
     def filled(self, node: Mapping, values: Values[str, Scalar]) -> Mapping:
         """The node with values for the placeholders; nodes without placeholders stay the same objects.

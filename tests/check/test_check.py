@@ -76,5 +76,5 @@ services: {driver: {image: driver, command: --cid=111, env_file: gone.env}}
         ("path-escape", "base.dodo.yml"),
         ("path-escape", "example.dodo.yml"),
         ("wrong-unit", "example.dodo.yml"),
-        ("service-taken", "example.dodo.yml"),
+        ("name-taken", "example.dodo.yml"),
     ]

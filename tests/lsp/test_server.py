@@ -59,7 +59,7 @@ def test_problems_of_other_files_are_shown_there_and_go(opened: Editor, reposito
     compose = repository.folder / "docker-compose.yml"
     compose.write_text(COMPOSE.replace("steering:", "camera:"))
     opened.notify("didSave", compose)
-    assert [p["code"] for p in opened.problems(repository.spec)] == ["service-taken"]
+    assert [p["code"] for p in opened.problems(repository.spec)] == ["name-taken"]
     compose.write_text(COMPOSE)
 
 

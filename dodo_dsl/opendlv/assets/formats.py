@@ -67,10 +67,7 @@ def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
     from dodo_dsl.opendlv.assets import truth_file
 
     frames: truth_file.Frames = settings["truth-frames"]  # type: ignore[assignment]
-    try:
-        pictures = truth_file.read(path, frames)
-    except truth_file.NoBoxes:
-        return  # reported by the rule on empty files
+    pictures = truth_file.read(path, frames)
     labels, known = {label for boxes in pictures.values() for label, _ in boxes}, truth_file.categories(path)
     for name in settings["classes"].split(","):
         if name in known and name not in labels:  # others are reported by the rule on names

@@ -48,10 +48,6 @@ class Truth(Struct, frozen=True):
     categories: list[Category]
 
 
-class NoBoxes(InputError):
-    """A truth without a single box."""
-
-
 def plain(label: str) -> str:
     """A class without ``color:`` and blanks around it."""
     return label.strip().removeprefix(PREFIX).strip()
@@ -71,7 +67,7 @@ def read(path: Path, frames: Frames) -> dict[int, list[tuple[str, Area]]]:
             (plain(names[entry.category_id].name), _box(path, entry, images[entry.image_id], place))
         )
     if not truth.annotations:
-        raise NoBoxes(path, "no boxes, expected at least one", "$.annotations")
+        raise InputError(path, "no boxes, expected at least one", "$.annotations")
     keys = _keys(images, frames, path)
     return {keys[number]: found for number, found in boxes.items()}
 

@@ -49,7 +49,7 @@ def test_a_report_s_text_is_in_the_log(folder: Path) -> None:
     """The standard output of a job goes into the report's file, so that the log would be empty."""
     code, text, _ = run("compile", "--check")
     assert "error[unknown-parameter]" in text
-    assert "warning[matrix-unused]" in text
+    assert "warning[unused-placeholder]" in text
     assert run("compile", "--check", "--format", "gitlab")[::2] == (code, text)
     assert run("compile", "--format", "gitlab")[2] == run("compile")[1]
 

@@ -48,7 +48,7 @@ def test_every_end_is_in_a_corner_and_the_rest_is_nominal() -> None:
 def unknown(written: str) -> list[str]:
     """The hints about a value."""
     node = mapping(f"vary: {{light: {{from: 0.3, to: 2, nominal: 1}}}}\nx: {written}\n")
-    return [problem.hint for problem in PLACEHOLDERS.unknown(node, "vary-unknown")]
+    return [problem.hint for problem in PLACEHOLDERS.unknown(node)]
 
 
 @pytest.mark.parametrize("written", ["${{ vary.light }}", "${vary.light", "${ vary.light }"])
