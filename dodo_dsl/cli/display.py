@@ -1,20 +1,19 @@
-"""How commands show things: colours of verdicts and diagnostics, ``-q`` and ``-v``, and a progress bar.
+"""How commands show things: colours of verdicts and diagnostics, ``-q`` and ``-v``.
 
 Colours are shown on a terminal, or where FORCE_COLOR asks for them, and never with NO_COLOR. The codes are those of
-ECMA-48, section 8.3.117 (SGR), in the terminal's own palette. A progress bar is shown on a terminal alone.
+ECMA-48, section 8.3.117 (SGR), in the terminal's own palette.
 """
 
 import argparse
 import contextlib
 import io
 import os
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
 from enum import IntEnum
 from typing import TextIO
 
 from dodo_dsl.diagnostics import Diagnostic, Piece, pieces
-from dodo_dsl.terminal import columns, printable, unescaped
+from dodo_dsl.terminal import columns, unescaped
 
 _CODES = {
     "passed": "32",
@@ -97,18 +96,3 @@ def chatter(stream: TextIO, verbosity: Verbosity) -> Iterator[TextIO]:
     except Exception:
         stream.write(unsaid.getvalue())
         raise
-
-
-@contextmanager
-def progress_bar(stream: TextIO, text: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Yields a function that takes how much of ``total`` is done."""
-    if not stream.isatty():
-        yield lambda _: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress, TextColumn
-
-    columns = (TextColumn("{task.description}", markup=False), *Progress.get_default_columns()[1:])
-    with Progress(*columns, console=Console(file=unescaped(stream)), transient=True) as progress:
-        task = progress.add_task(printable(text), total=total)
-        yield lambda done: progress.update(task, completed=done)

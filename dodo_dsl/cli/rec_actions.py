@@ -12,9 +12,7 @@ from typing import TextIO
 
 from dodo_dsl import atomic
 from dodo_dsl.atomic import refuse_existing
-from dodo_dsl.cli.display import progress_bar
 from dodo_dsl.opendlv import message_versions
-from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import OdvdError
@@ -32,6 +30,7 @@ class RecJob:
 
     options: argparse.Namespace
     recording: Recording
+    version: str
     messages: MessageSet
     stdout: TextIO
     stderr: TextIO
@@ -39,12 +38,6 @@ class RecJob:
     def tell(self, text: str) -> None:
         """A sentence for the user, besides the result."""
         tell(self.stderr, text)
-
-    @contextmanager
-    def progress(self, text: str, total: int) -> Iterator[Callable[[int], None]]:
-        """Yields a function that takes how much of ``total`` is done."""
-        with progress_bar(self.stderr, text, total) as progress:
-            yield progress
 
     def rows(self) -> Numbers:
         """The rows that the command line selects; reports damage first."""
@@ -112,28 +105,23 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
 
         rec_export.run(options, stdout, stderr)
         return
-    with opened(options.file, options, stdout, stderr) as (job, version):
+    with opened(options.file, options, stdout, stderr) as job:
         if options.action == "info":
-            _info(job, version)
+            _info(job)
         else:
             _cut(job)
 
 
 @contextmanager
-def opened(path: Path, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> Iterator[tuple[RecJob, str]]:
-    """A recording of the command line, and the version of its messages."""
-    with progress_bar(stderr, f"reading {path.name}", path.stat().st_size) as progress:
-        recording = Recording(path, progress)
-    with recording:
+def opened(path: Path, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> Iterator[RecJob]:
+    """A recording of the command line."""
+    with Recording(path) as recording:
         version, messages = messages_for(recording, options.messages, lambda text: tell(stderr, text))
-        yield RecJob(options, recording, messages, stdout, stderr), version
+        yield RecJob(options, recording, version, messages, stdout, stderr)
 
 
-def _info(job: RecJob, version: str) -> None:
-    images = len(job.recording.rows(messages=[IMAGE]))
-    with job.progress("decoding frames", images) as progress:
-        decoding = None if job.options.no_decode else progress
-        found = contents.look(job.recording, job.messages, version, decoding, job.tell)
+def _info(job: RecJob) -> None:
+    found = contents.look(job.recording, job.messages, job.version, not job.options.no_decode, job.tell)
     if job.options.json:
         job.stdout.write(json_text(found.as_json(job.recording)))
     else:
@@ -143,6 +131,6 @@ def _info(job: RecJob, version: str) -> None:
 def _cut(job: RecJob) -> None:
     output = job.file()
     rows = job.rows()
-    with atomic.replacing(output, durable=True) as place, job.progress(f"writing {output.name}", len(rows)) as progress:
-        recording_filter.copy_rows(job.recording, rows, place, progress)
+    with atomic.replacing(output, durable=True) as place:
+        recording_filter.copy_rows(job.recording, rows, place)
     job.stdout.write(f"{output}: {len(rows)} of {len(job.recording)} messages\n")

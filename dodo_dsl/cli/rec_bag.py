@@ -10,7 +10,6 @@ from msgspec.structs import replace
 
 from dodo_dsl import advice, atomic
 from dodo_dsl.atomic import refuse_existing
-from dodo_dsl.cli.display import progress_bar
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.rec_actions import RecJob, tell
 from dodo_dsl.opendlv.message_set import MessageSet
@@ -38,13 +37,9 @@ def import_bag(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> N
     output: Path = options.output or path.resolve().with_suffix(".rec")
     refuse_existing([output], options.force)
     known, types = _of_application()
-    with (
-        atomic.replacing(output, durable=True) as place,
-        bag.opened(path) as found,
-        progress_bar(stderr, f"reading {path.name}", found.counts.total()) as progress,
-    ):
+    with atomic.replacing(output, durable=True) as place, bag.opened(path) as found:
         result = BagImport(found, types, known, options.lossy)
-        result.write(place, progress)
+        result.write(place)
     lines = [
         f"{each.topic} ({each.type}): {result.counts[each.topic]} -> {', '.join(each.bus)}"
         for each in result.topics.values()
@@ -63,13 +58,9 @@ def export_bag(job: RecJob) -> None:
     folder = job.folder()
     refuse_existing([folder / "metadata.yaml", folder / f"{folder.name}.mcap"], job.options.force)
     rows = job.rows()
-    with (
-        atomic.files_into(folder) as place,
-        job.progress(f"writing {folder.name}", len(rows)) as progress,
-        bag.written(place, folder.resolve().name) as writer,
-    ):
+    with atomic.files_into(folder) as place, bag.written(place, folder.resolve().name) as writer:
         result = BagExport(job.recording, Types(messages=job.messages), writer)
-        result.write(rows, progress)
+        result.write(rows)
         if not result.counts:
             raise NothingSelected(f"{job.recording.path} has no message that has a type of ROS 2")
     lines = [f"{topic} ({type_}): {count}" for (topic, type_), count in sorted(result.counts.items())]

@@ -26,8 +26,8 @@ def _csv(job: RecJob) -> None:
     folder = job.folder()
     known, names = _known(job, "tables")
     refuse_existing([folder / name for name in names], job.options.force)
-    with atomic.files_into(folder) as place, job.progress("writing tables", len(known)) as progress:
-        undecodable = csv_table.write(job.recording, job.messages, known, place, progress)
+    with atomic.files_into(folder) as place:
+        undecodable = csv_table.write(job.recording, job.messages, known, place)
     _tell_skipped(job, undecodable)
     job.stdout.write(f"{folder}: {len(names)} tables with {len(known) - undecodable.total()} rows\n")
 
@@ -67,8 +67,8 @@ def _frames(job: RecJob) -> None:
     images, _ = _images(job)
     names, count = frame_names(job.recording, images, options.pictures), 0
     refuse_existing([folder / name for name in names], options.force)
-    with atomic.files_into(folder) as place, job.progress("decoding frames", len(images)) as progress:
-        for number, _, frame in frames(job.recording, images, progress, job.tell):
+    with atomic.files_into(folder) as place:
+        for number, _, frame in frames(job.recording, images, job.tell):
             write_picture(place / names[number], frame)
             count += 1
     job.stdout.write(f"{folder}: {count} frames\n")
@@ -77,8 +77,8 @@ def _frames(job: RecJob) -> None:
 def _video(job: RecJob) -> None:
     output = job.file(".mp4")
     images, _ = _images(job)
-    with atomic.replacing(output) as place, job.progress(f"writing {output.name}", len(images)) as progress:
-        count, (width, height) = write_video(job.recording, images, place, progress, job.tell)
+    with atomic.replacing(output) as place:
+        count, (width, height) = write_video(job.recording, images, place, job.tell)
     job.stdout.write(f"{output}: {count} frames of {width} x {height} pixels\n")
 
 
@@ -88,8 +88,8 @@ def _mcap(job: RecJob) -> None:
 
     output = job.file(".mcap")
     known, _ = _known(job, "topics")
-    with atomic.replacing(output) as place, job.progress(f"writing {output.name}", len(known)) as progress:
-        written = mcap.write_mcap(job.recording, job.messages, known, place, progress)
+    with atomic.replacing(output) as place:
+        written = mcap.write_mcap(job.recording, job.messages, known, place)
     _tell_skipped(job, written.undecodable)
     job.stdout.write(f"{output}: {written.messages} messages, and {written.converted} of them for Foxglove, too\n")
 
@@ -110,7 +110,7 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
         return
     if len(options.files) > 1:
         raise NothingSelected(f"--{options.format} takes one recording")
-    with opened(options.files[0], options, stdout, stderr) as (job, _):
+    with opened(options.files[0], options, stdout, stderr) as job:
         EXPORTS[options.format](job)
 
 
@@ -130,7 +130,7 @@ def _data_set(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> No
     with atomic.files_into(folder) as place:
         for part, chosen in parts.items():
             for number in chosen:
-                with opened(files[number], options, stdout, stderr) as (job, _):
+                with opened(files[number], options, stdout, stderr) as job:
                     _add(job, sets[part], place / part, f"{number + 1:03}-" if len(files) > 1 else "")
         classes = {name for each in sets.values() for _, (name, _) in each.boxes}
         for part, each in sets.items():
@@ -160,5 +160,4 @@ def _add(job: RecJob, found: coco.DataSet, folder: Path, prefix: str) -> None:
         labels = coco.of_truth(job.recording, images, job.options.truth)
     else:
         labels = coco.detections(job.recording, job.messages, rows, job.options.labels)
-    with job.progress(f"decoding {job.recording.path.name}", len(images)) as progress:
-        found.add(job.recording, images, labels, folder, prefix, job.options.pictures, progress, job.tell)
+    found.add(job.recording, images, labels, folder, prefix, job.options.pictures, job.tell)

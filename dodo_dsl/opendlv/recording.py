@@ -7,7 +7,7 @@ file is.
 
 import os
 import struct
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
@@ -215,8 +215,8 @@ class Recording:
     ``time`` is the sample time, or if that is zero when the message was received, or else sent.
     """
 
-    def __init__(self, path: Path, progress: Callable[[int], None] | None = None, most: float = float("inf")) -> None:
-        """Read a file once, up to about ``most`` bytes; ``progress`` gets the number of bytes read.
+    def __init__(self, path: Path, most: float = float("inf")) -> None:
+        """Read a file once, up to about ``most`` bytes.
 
         Raises OSError for an unreadable file and for what is none, RecordingError for one without a single message.
         """
@@ -224,7 +224,7 @@ class Recording:
         self._stream: BinaryIO = regular_file.opened(path)
         try:
             self.size = os.fstat(self._stream.fileno()).st_size
-            self.damage, self.index = _indexed(path, self._stream, progress, most)
+            self.damage, self.index = _indexed(path, self._stream, most)
         except BaseException:
             self._stream.close()
             raise
@@ -316,9 +316,7 @@ def matching(index: NDArray[np.void], keys: Iterable[tuple[int, int | None]]) ->
     return marks
 
 
-def _indexed(
-    path: Path, stream: BinaryIO, progress: Callable[[int], None] | None, most: float
-) -> tuple[Damage, NDArray[np.void]]:
+def _indexed(path: Path, stream: BinaryIO, most: float) -> tuple[Damage, NDArray[np.void]]:
     scanner = Scanner(stream)
     index = bytearray()  # grows in place, so that there is never a second one
     for batch in scanner.batches():
@@ -331,8 +329,6 @@ def _indexed(
         part["sampled"] = sampled
         part["time"] = np.where(sampled, sampled, np.where(received, received, sent))
         index += part.tobytes()
-        if progress is not None:
-            progress(scanner.position)
         if scanner.position >= most:
             break
     if scanner.position and not index:

@@ -1,7 +1,7 @@
 """A recording as a bag of ROS 2, with a topic for each message that has a type there."""
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -47,8 +47,7 @@ class BagExport:
         self._connections: dict[str, Any] = {}
         self._decoder = FrameDecoder()
 
-    def write(self, rows: Numbers, progress: Callable[[int], None]) -> None:
-        """Write the messages of some rows; ``progress`` gets how many are done."""
+    def write(self, rows: Numbers) -> None:
         index = self._recording.index[rows]
         there = sorted(set(zip(index["data_type"].tolist(), index["sender_stamp"].tolist(), strict=True)))
         first = next((stamp for id_, stamp in there if id_ == IMAGE), None)
@@ -58,7 +57,7 @@ class BagExport:
             for name in topic.bus:
                 id_, stamp = self._messages.key(name)
                 routes[id_, stamp or 0].append(gathered)
-        for done, envelope in enumerate(self._recording.envelopes(rows[np.argsort(index["time"], kind="stable")]), 1):
+        for envelope in self._recording.envelopes(rows[np.argsort(index["time"], kind="stable")]):
             key = envelope.data_type, envelope.sender_stamp
             if envelope.data_type == IMAGE:
                 self._picture(envelope, "/camera" if key[1] == first else f"/camera_{key[1]}")
@@ -66,7 +65,6 @@ class BagExport:
                 self.left_out[envelope.data_type] += 1
             for gathered in routes.get(key, ()):
                 self._gather(gathered, envelope)
-            progress(done)
         for gathered in (each for some in routes.values() for each in some):
             self._store(gathered)
 

@@ -1,7 +1,7 @@
 """A bag of ROS 2 as a recording, by the types of its topics."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from msgspec import structs
@@ -35,10 +35,10 @@ class BagImport:
             types.check(topic)
         self.left_out = {key: count for key, count in bag.counts.items() if key not in self.topics}
 
-    def write(self, place: Path, progress: Callable[[int], None]) -> None:
+    def write(self, place: Path) -> None:
         """Writes the new recording; raises BagError if there is nothing for it."""
         with RecordingWriter(place) as writer:
-            for done, (key, time, data) in enumerate(self._bag.messages(self.topics), 1):
+            for key, time, data in self._bag.messages(self.topics):
                 try:
                     for envelope in self._envelopes(self.topics[key], data, time):
                         writer.write(envelope)
@@ -46,7 +46,6 @@ class BagImport:
                 except (TypeError, ValueError) as error:
                     self.skipped[key[0]] += 1
                     self.reasons.setdefault(key[0], str(error))
-                progress(done)
             if not writer.frames:
                 why = next(iter(self.reasons.values()), "none of its topics has a type that a recording knows")
                 raise BagError(f"'{self._bag.path}' has nothing for a recording: {why}")

@@ -76,12 +76,12 @@ class DataSet:
 
     def add(
         self, recording: Recording, images: Numbers, labels: Mapping[int, list[LabelledBox]], folder: Path,
-        prefix: str, picture_type: str, progress: Callable[[int], None], problem: Callable[[str], None],
+        prefix: str, picture_type: str, problem: Callable[[str], None],
     ) -> None:  # fmt: skip
         """Writes the frames with labels, whose names begin with ``prefix``; raises FramesError and OSError."""
         names = frame_names(recording, images, picture_type)
         (folder / "images").mkdir(parents=True, exist_ok=True)
-        for number, envelope, frame in frames(recording, images, progress, problem):
+        for number, envelope, frame in frames(recording, images, problem):
             if boxes := self.cut_boxes(labels.get(envelope.sample_time, ()), frame.width, frame.height):
                 path, id_ = f"images/{prefix}{names[number]}", len(self.images) + 1
                 write_picture(folder / path, frame)

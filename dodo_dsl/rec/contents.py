@@ -64,16 +64,9 @@ class Contents:
 
 
 def look(
-    recording: Recording,
-    messages: MessageSet,
-    message_set: str,
-    progress: Callable[[int], None] | None,
-    problem: Callable[[str], None],
+    recording: Recording, messages: MessageSet, message_set: str, decodes: bool, problem: Callable[[str], None]
 ) -> Contents:
-    """Count everything; frames are decoded if ``progress`` is given, which gets their number.
-
-    ``problem`` gets a sentence about what cannot be decoded at all.
-    """
+    """Count everything; ``problem`` gets a sentence about what cannot be decoded at all."""
     found = streams(recording, messages)  # before the times are copied, for the sake of memory
     times = recording.index["time"]
     stamped = times[times != 0]
@@ -88,7 +81,7 @@ def look(
         untimed=int((recording.index["sampled"] == 0).sum()),
         message_set=message_set,
         messages=found,
-        frames=_frames(recording, progress, problem),
+        frames=_frames(recording, decodes, problem),
     )
 
 
@@ -112,15 +105,10 @@ def _rate(times: Numbers) -> tuple[float | None, float | None]:
     return round((len(ordered) - 1) * 1e6 / span, 3), int(np.diff(ordered).max()) / 1e6
 
 
-def _frames(recording: Recording, progress: Callable[[int], None] | None, problem: Callable[[str], None]) -> Frames:
+def _frames(recording: Recording, decodes: bool, problem: Callable[[str], None]) -> Frames:
     rows = recording.rows(messages=[IMAGE])
-    if progress is None:
-        return Frames(len(rows), None)
-    count = 0
-    for done, (_, frame) in enumerate(decoded(recording, rows, problem), 1):
-        count += frame is not None
-        progress(done)
-    return Frames(len(rows), count)
+    found = sum(frame is not None for _, frame in decoded(recording, rows, problem)) if decodes else None
+    return Frames(len(rows), found)
 
 
 _SHOWN = 10

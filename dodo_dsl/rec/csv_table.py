@@ -6,7 +6,7 @@ with ``;``, times are seconds and microseconds, floats have 7 digits and doubles
 
 import base64
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,16 +25,12 @@ TIMES = tuple(
 _FORMATS = {"float": "%.7g;", "double": "%.11g;", "string": '"%s";', "bytes": '"%s";', "char": "%c;"}
 
 
-def write(
-    recording: Recording, messages: MessageSet, rows: Numbers, folder: Path, progress: Callable[[int], None]
-) -> Counter[int]:
+def write(recording: Recording, messages: MessageSet, rows: Numbers, folder: Path) -> Counter[int]:
     """Write the files of the known messages among ``rows`` into a folder that has none of them yet.
 
-    ``progress`` gets the number of rows done. Returns how many payloads of which message could not be decoded: they
-    have no row. Raises OSError and RecordingError.
+    Returns how many payloads of which message cannot be decoded: they have no row. Raises OSError and RecordingError.
     """
     undecodable: Counter[int] = Counter()
-    done = 0
     for batch in recording.batches(recording.by_time(rows)):
         for data_type, sender_stamp, group in _groups(batch):
             layout = messages.layout(data_type)
@@ -45,8 +41,6 @@ def write(
                 if file.tell() == 0 and lines:
                     file.write(_header(layout))
                 file.write("".join(lines))
-        done += len(batch)
-        progress(done)
     return +undecodable
 
 

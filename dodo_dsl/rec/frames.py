@@ -57,11 +57,11 @@ def decoded(
 
 
 def frames(
-    recording: Recording, images: Numbers, progress: Callable[[int], None], problem: Callable[[str], None]
+    recording: Recording, images: Numbers, problem: Callable[[str], None]
 ) -> Iterator[tuple[int, Envelope, DecodedFrame]]:
     """The frames that can be decoded, each with its number among ``images``; raises FramesError if there is none.
 
-    ``progress`` gets how many packets are done, ``problem`` sentences on those without a frame.
+    ``problem`` gets sentences on packets without a frame.
     """
     lost = 0
     for number, (envelope, frame) in enumerate(decoded(recording, images, problem)):
@@ -69,7 +69,6 @@ def frames(
             lost += 1
         else:
             yield number, envelope, frame
-        progress(number + 1)
     if lost == len(images):
         raise FramesError(f"no frame of {recording.path} can be decoded")
     if lost:

@@ -92,10 +92,8 @@ class McapCounts:
     undecodable: Counter[int] = field(default_factory=Counter)
 
 
-def write_mcap(
-    recording: Recording, messages: MessageSet, rows: Numbers, place: Path, progress: Callable[[int], None]
-) -> McapCounts:
-    """Write the known messages among ``rows`` in the order of their times; ``progress`` gets the number of rows done.
+def write_mcap(recording: Recording, messages: MessageSet, rows: Numbers, place: Path) -> McapCounts:
+    """Write the known messages among ``rows`` in the order of their times.
 
     The log time is the sample time, or if that is zero when the message was received, or else sent; the publish
     time is when it was sent. Times before 1970 become 1970. Memory is bounded by what ``Recording.batches`` holds and
@@ -107,9 +105,8 @@ def write_mcap(
         writer = Writer(stream)
         writer.start(library=f"DoDo {__version__}")
         channels = _Channels(writer, messages)
-        for done, envelope in enumerate(recording.envelopes(ordered), 1):
+        for envelope in recording.envelopes(ordered):
             _write_one(channels, envelope, result)
-            progress(done)
         writer.finish()  # type: ignore[no-untyped-call]
     return result
 

@@ -1,6 +1,6 @@
 """The part of a recording that a command works on, some messages and a time range, and its copy byte for byte."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -46,12 +46,8 @@ def _microseconds(seconds: float | None, begin: int) -> int | None:
     return round(seconds * 1e6) + (0 if seconds >= ABSOLUTE_S else begin)
 
 
-def copy_rows(recording: Recording, rows: Numbers, path: Path, progress: Callable[[int], None]) -> None:
-    """Writes rows unchanged into a new file; ``progress`` gets the number of rows done.
-
-    Raises OSError and RecordingError.
-    """
+def copy_rows(recording: Recording, rows: Numbers, path: Path) -> None:
+    """Writes rows unchanged into a new file; raises OSError and RecordingError."""
     with RecordingWriter(path) as writer:
         for batch in recording.batches(rows):
             writer.write_frames(batch.frames())
-            progress(writer.frames)

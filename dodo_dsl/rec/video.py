@@ -17,17 +17,12 @@ _ENCODING = {"crf": "18", "preset": "veryfast", "tune": "zerolatency"}
 
 
 def write_video(
-    recording: Recording,
-    images: Numbers,
-    place: Path,
-    progress: Callable[[int], None],
-    problem: Callable[[str], None],
+    recording: Recording, images: Numbers, place: Path, problem: Callable[[str], None]
 ) -> tuple[int, tuple[int, int]]:
     """Write the frames of one camera; how many they are, and their width and height.
 
-    Each is shown at least 1 us and at most MOST_GAP after the one before. ``progress`` gets the number of packets done,
-    ``problem`` a sentence about what cannot be decoded. Raises FramesError if nothing can be written, or frames do not
-    fit into one file, and OSError.
+    Each is shown at least 1 us and at most MOST_GAP after the one before. ``problem`` gets a sentence about what cannot
+    be decoded. Raises FramesError if nothing can be written, or frames do not fit into one file, and OSError.
     """
     av = pyav("encoded")
     count = shown = last = 0
@@ -35,7 +30,7 @@ def write_video(
     stream: Any = None
     try:
         with av.open(str(place), "w", format="mp4", options={"movflags": "+faststart"}) as container:
-            for _, envelope, frame in frames(recording, images, progress, problem):
+            for _, envelope, frame in frames(recording, images, problem):
                 if stream is None:
                     size, last = (frame.width, frame.height), envelope.sample_time
                     stream = _stream(container, *size)

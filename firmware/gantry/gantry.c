@@ -114,12 +114,8 @@ static void stop(void)
     rig_acknowledge();
 }
 
-static uint8_t execute_circle(const struct request *request)
+static uint8_t goto_heading(const struct request *request)
 {
-    if (request->command == COMMAND_KIND) {
-        port_send_line(KIND_ANSWER);
-        return 0;
-    }
     uint8_t error = motion_goto(request->numbers);
     if (error == 0)
         circle.way = request->command == COMMAND_GOTO       ? WAY_SHORTEST
@@ -131,7 +127,7 @@ static uint8_t execute_circle(const struct request *request)
 static uint8_t execute(const struct request *request)
 {
     if (RIG_KIND == KIND_CIRCLE && (request->command == COMMAND_GOTO || request->command >= COMMAND_GOTOLEFT))
-        return execute_circle(request);
+        return goto_heading(request);
     if (request->command == COMMAND_STOP || request->command == COMMAND_CALIBRATE)
         rig.resumed = false;
     switch (request->command) {

@@ -7,9 +7,7 @@ Exit codes: 0 done, 1 the rig cannot (``error`` says why; of ``check``, ``reason
 
 import json
 import math
-import statistics
 import sys
-import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -31,13 +29,9 @@ from services.gantry.service import describe, opened, place
 ROUNDS = 20
 ANSWER = 0.25
 """s within which position and status have to come, each time."""
-LATENCY = 0.05
-"""s that the median answer may take; the firmware needs 5 ms and the line as much."""
 DECIMAL = 1e-4
 INDEX = -math.pi
 """rad, the heading at the index of a yaw that turns without end, by its firmware."""
-TRIES = 3
-"""Of which the best counts, as a busy machine sometimes measures late."""
 
 
 def find_home(limits: MotionLimits, conversion: Conversion) -> Position:
@@ -56,26 +50,10 @@ def read_state(link: Link) -> tuple[Position | None, Status]:
 
 
 def run_checks(link: Link, kept: Mapping[str, float], patience: float) -> None:
-    """Finds home, writes the limits ``kept`` and times the answers; raises RigError, why the rig is unfit."""
+    """Finds home, and writes the limits ``kept``; raises RigError, why the rig is unfit."""
     start.settle(link, start.find(link))
     memory.agree(link, kept, write=True)
     start.calibrate(link, patience)
-    missed, latency = min(_answers(link) for _ in range(TRIES))
-    if missed:
-        raise RigError(f"answers is {ROUNDS - missed} of {ROUNDS}, expected at least {ROUNDS}")
-    if latency > LATENCY:
-        raise RigError(f"latency is {1000 * latency:.3g} ms, expected at most {1000 * LATENCY:g}")
-
-
-def _answers(link: Link) -> tuple[int, float]:
-    """How many of some rounds have no answer in time, and the median time of the others (s)."""
-    took = []
-    for _ in range(ROUNDS):
-        begin = time.monotonic()
-        at, status, *_ = link.exchange(REQUEST_STATE, ANSWER)
-        if at is not None and status is not None:
-            took.append(time.monotonic() - begin)
-    return ROUNDS - len(took), statistics.median(took) if took else ANSWER
 
 
 ACTIONS = {"status": 0, "home": 0, "goto": 3, "calibrate": 0, "check": 0}

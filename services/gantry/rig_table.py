@@ -55,7 +55,7 @@ CIRCLE_OFFSET = 100
 """Full steps of a turn of a rig that turns without end, and from its index to heading 0."""
 TURN = 25_600
 """Microsteps of a turn of a rig that turns without end."""
-CIRCLE_COMMANDS = {"GOTOLEFT": 3, "GOTORIGHT": 3, "KIND": 0}
+CIRCLE_COMMANDS = {"GOTOLEFT": 3, "GOTORIGHT": 3}
 """Commands that only such a rig has, and the number of arguments of each."""
 INDEX = 10, 3
 """Degrees below the heading backward in which its index is closed, and by which it may be elsewhere."""

@@ -1,15 +1,16 @@
-"""The tests notice each weakened safety rule of firmware/mutants.yml."""
+"""The tests notice each weakened safety rule of mutants.yml."""
 
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import yaml
 
 from tests.firmware.programs import ROOT
 
-TESTS = [*yaml.safe_load((ROOT / "firmware" / "mutants.yml").read_text(encoding="utf-8"))]
+TESTS = [*yaml.safe_load(Path(__file__).with_name("mutants.yml").read_text(encoding="utf-8"))]
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@ from pathlib import Path
 
 import pytest
 
-from services.gantry import manual
 from services.gantry.link import Link, RigError
 from services.gantry.manual import find_home, read_state, run_checks
 from services.gantry.memory import wanted
@@ -13,9 +12,8 @@ from tests.services.gantry.fake_rig import FakeRig
 
 
 @pytest.fixture
-def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> "tuple[FakeRig, Link]":
+def line(tmp_path: Path) -> "tuple[FakeRig, Link]":
     """A rig whose home is found at once, wherever it is."""
-    monkeypatch.setattr(manual, "ROUNDS", 3)
     with FakeRig(tmp_path / "rig") as rig:
         link = Link(str(rig.path))
         yield rig, link

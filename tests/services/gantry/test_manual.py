@@ -45,9 +45,7 @@ def test_uncalibrated(rig: FakeRig) -> None:
     assert manual(rig, "calibrate")["status"] == 0
 
 
-def test_check_of_a_good_rig_and_of_one_that_answers_late(rig: FakeRig, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_check_of_a_good_rig(rig: FakeRig) -> None:
     rig.at = [-0.85, -0.65, -2.5]
     result = manual(rig, "check")
     assert result["ok"] and result["word"] == "idle"
-    monkeypatch.setattr("services.gantry.manual.LATENCY", 0.0)
-    assert manual(rig, "check", code=1)["reason"].startswith("latency is ")
