@@ -26,12 +26,10 @@ def missing(extra: str) -> str:
 
 
 def install(extra: str) -> str:
-    """A command that adds an extra to the DoDo of this Python."""
     return f"{sys.executable} -m pip install 'dodo-dsl[{extra}]'"
 
 
 def engine() -> str:
-    """How to make a Docker engine answer."""
     if host := os.environ.get("DOCKER_HOST"):
         return f"DOCKER_HOST is {host}: start the engine there, in a job of GitLab as its service, or unset DOCKER_HOST"
     joining = "join its group (usermod -aG docker $USER, then log in again)"

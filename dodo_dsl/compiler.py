@@ -144,8 +144,6 @@ class Compilation:
 
 
 class NoApplication(Exception):
-    """Plans need an application, and neither the command line nor a deployment names one."""
-
     usage = True
 
     def __init__(self) -> None:
@@ -196,14 +194,12 @@ def load(
 
 
 def narrowed(checked: Checked, specs: Collection[Spec]) -> Checked:
-    """The same with fewer tests, and the problems of these."""
     keys = {(spec.path, spec.slug) for spec in specs}
     tests = tuple(test for test in checked.tests if (test.spec.path, test.spec.slug) in keys)
     return _with_tests(replace(checked, problems=checked.problems.without_unused(tests)), tests)
 
 
 def _with_tests(checked: Checked, tests: tuple[ResolvedTest, ...]) -> Checked:
-    """The same with these tests, and what is wrong with them, alone and together."""
     together = check_suite(tests, checked.deployment, checked.application)
     found = ordered([*checked.problems.of(test.spec for test in tests), *together])
     return replace(checked, tests=tests, diagnostics=tuple(found))

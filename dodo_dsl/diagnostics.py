@@ -60,7 +60,6 @@ class Diagnostic:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names as in a sentence: ``a, b and c``."""
     return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
@@ -97,7 +96,6 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def shown_path(file: str) -> str:
-    """The path relative to the working folder if it lies below it."""
     path = Path(file)
     if not path.is_absolute():
         return file
@@ -177,7 +175,6 @@ def format_json(diagnostics: Sequence[Diagnostic]) -> str:
 
 
 def format_gitlab(diagnostics: Sequence[Diagnostic]) -> str:
-    """GitLab's code quality report."""
     rows = [
         {
             "description": d.sentence + (f" ({d.hint})" if d.hint else ""),

@@ -14,7 +14,6 @@ PIPELINES = ("tests", "run")
 
 
 def root() -> Path:
-    """The folder that holds ``schemas``, ``templates``, ``services`` and ``tests_registry``."""
     bundled = _PACKAGE / "_data"
     return bundled if bundled.is_dir() else _PACKAGE.parent
 
@@ -41,7 +40,6 @@ def checkout() -> Path | None:
 
 
 def is_checkout(folder: Path) -> bool:
-    """Whether a folder has what installs DoDo."""
     return (folder / "dodo_dsl").is_dir() and (folder / "scripts" / "setup").is_file()
 
 

@@ -149,7 +149,6 @@ def _too_deep(failure: Failure, above: int) -> Diagnostic | None:
 
 
 def _between_levels(failure: Failure) -> Diagnostic | None:
-    """A line whose indentation is that of no line above."""
     number = failure.mark[0]
     deep = _indent(failure.line(number))
     if failure.mark[1] > deep:

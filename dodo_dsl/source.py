@@ -80,7 +80,6 @@ Reader = Callable[[Path], tuple[Node | None, list[Diagnostic]]]
 
 
 def plain(node: Node) -> Any:
-    """The node as dictionaries, lists and scalars."""
     if isinstance(node, Mapping):
         return {key: plain(entry.value) for key, entry in node.entries.items()}
     if isinstance(node, Sequence):
@@ -102,7 +101,6 @@ def entries(node: Node | None, *keys: str) -> dict[str, Entry]:
 
 
 def walk(node: Node) -> Iterator[Node]:
-    """The node and everything below it."""
     waiting = [node]
     while waiting:
         one = waiting.pop()
@@ -339,7 +337,6 @@ def read(path: Path) -> tuple[Node | None, list[Diagnostic]]:
 
 
 def parse_bytes(raw: bytes, file: str) -> tuple[Node | None, list[Diagnostic]]:
-    """As ``parse``, from the content of a file."""
     if len(raw) > MAX_BYTES:
         return None, [Diagnostic(Span(file), "too-large", f"the file is larger than {MAX_BYTES // 1024} KiB")]
     if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):

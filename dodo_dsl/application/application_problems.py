@@ -53,7 +53,6 @@ def application_problems(
 
 
 def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
-    """Services that depend on themselves, directly or through others."""
     services = application.services
     needs = {n: {other for _, other in references(plain(s.node)) if other in services} for n, s in services.items()}
     try:
@@ -125,7 +124,6 @@ def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
 
 
 def takes_cid(service: ComposeService) -> bool:
-    """Whether the CID of a service can be set."""
     variables = variables_of(service, {}, lambda _: True)
     written = [word for key in COMMANDS for word, _ in words_of(service.raw.get(key, service.node.get(key)))]
     found = [*written, *(value for value in variables.values() if value)]
@@ -133,7 +131,6 @@ def takes_cid(service: ComposeService) -> bool:
 
 
 def unknown_keys(service: Node) -> Iterator[Diagnostic]:
-    """Unknown keys that are like DoDo's."""
     entries = source.entries(service)
     for word, entry in entries.items():
         is_near = word.startswith("x-") and difflib.get_close_matches(word.lower(), KEYS, cutoff=0.8)
@@ -156,5 +153,4 @@ def _bad(span: Span, message: str, hint: str = "") -> Diagnostic:
 
 
 def _is_cid(value: str) -> bool:
-    """Whether a text is a whole number from 1 to 254."""
     return value.isascii() and value.isdigit() and len(value) < 9 and 1 <= int(value) <= _HIGHEST

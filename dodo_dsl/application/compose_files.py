@@ -32,7 +32,6 @@ _MAX_ENV = 1 << 20
 
 
 def is_late(name: str, others: Collection[str]) -> bool:
-    """Whether a variable has its value only when a test runs, as ``others`` have."""
     return name in others or name in _LATE or name.startswith(_IMAGES)
 
 
@@ -67,12 +66,10 @@ class ComposeFiles:
         return filled(text, {**(own or {}), **self.known}, self.is_late)
 
     def is_late(self, name: str) -> bool:
-        """Whether a variable has its value only when a test runs."""
         return is_late(name, (*self.passed, *self.secrets))
 
     @property
     def full(self) -> bool:
-        """Whether the files hold more values than are read."""
         return self._nodes > MAX_NODES
 
     def grow(self, node: Node, span: Span) -> bool:
@@ -93,7 +90,6 @@ class ComposeFiles:
         self.problems.append(Diagnostic(span, "application-file", message, hint))
 
     def read(self, file: Path) -> source.Mapping | None:
-        """A file as it is written."""
         if file not in self._read:
             node, found = source.read(file)
             if node is None and not found:
@@ -158,7 +154,6 @@ class ComposeFiles:
         return file
 
     def holds(self, word: Scalar, folder: Path) -> bool:
-        """Whether the repository holds what a file in ``folder`` names; a problem says so where it does not."""
         problem = HostPaths(folder.resolve(), self._roots).file_problem(word.text)
         if problem:
             self.problems.append(Diagnostic(word.span, "application-isolation", problem, "keep it in the repository"))

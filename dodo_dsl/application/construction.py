@@ -89,7 +89,6 @@ class Construction:
             yield name, entry.value, entry.key
 
     def rebased(self, path: str) -> str:
-        """A path of the application as seen from the compiled test's folder."""
         if self._is_whole:
             return self.paths.whole(path)
         if path.startswith(("/", "~")):
@@ -121,11 +120,9 @@ class Construction:
         return replace(mount, source=self.rebased(mount.source), read_only=read_only)
 
     def services(self) -> dict[str, dict[str, Any]]:
-        """The services of the compose file as containers of the test."""
         return {name: container.made() for name, container in self.containers.items()}
 
     def rest(self) -> dict[str, Any]:
-        """The top-level keys beside ``services``."""
         made = {
             key: {name: self._file(key, name, node, span) for name, node, span in self._named(key)}
             for key in ("secrets", "configs")
@@ -134,7 +131,6 @@ class Construction:
         return {key: value for key, value in {"volumes": volumes, **made}.items() if value}
 
     def _volume(self, name: str, node: Node, span: Span) -> dict[str, Any]:
-        """A volume as the test has it: its own, or one of the engine to be read."""
         of = Part(self, name, span, self.problems)
         fields = of.fields(node, f"the volume '{name}'", "external name", "labels", _VOLUME)
         external = fields.get("external")
@@ -147,7 +143,6 @@ class Construction:
         return {"external": True, "name": called}
 
     def _file(self, key: str, name: str, node: Node, span: Span) -> dict[str, Any]:
-        """A secret or config: of a file of the repository, of a variable that is passed, or a text."""
         what, known = f"the {key[:-1]} '{name}'", self.application.known
         of = Part(self, what, span, self.problems)
         fields = of.fields(node, what, "file environment content", "labels name", _FILE)
@@ -172,7 +167,6 @@ class Construction:
         return {"file": "/dev/null"}
 
     def check(self) -> list[Diagnostic]:
-        """The problems of everything but the services, which are made already."""
         self.rest()
         self._top()
         for span, message, hint in nested(self):

@@ -36,13 +36,10 @@ Key = Callable[["Container", Node], Any]
 
 
 def is_carried(key: str) -> bool:
-    """Whether a test carries a key of a service."""
     return key in _CARRIED
 
 
 class Container(Part):
-    """The service while it is made."""
-
     def __init__(self, project: "Construction", service: ComposeService) -> None:
         super().__init__(project, service.name, service.span, [])
         self.service = service
@@ -54,7 +51,6 @@ class Container(Part):
         self.mounts = mounts(self, node) if node else []
 
     def made(self) -> dict[str, Any]:
-        """What the container has."""
         for key, entry in self.service.node.entries.items():
             if key in _CARRIED:
                 value = _CARRIED[key](self, entry.value) if is_set(entry.value) else None
@@ -76,7 +72,6 @@ class Container(Part):
         return self.own
 
     def filled(self, key: str) -> Any:
-        """A value with the variables of the test filled in."""
         node = self.service.raw.get(key)
         return None if node is None else plain(filled_node(node, self.known, self.project.application.is_late))
 
@@ -155,7 +150,6 @@ def _own_environment(c: Container) -> None:
 
 
 def _namespace(c: Container, key: str, node: Node) -> Any:
-    """Another service's namespace."""
     word = c.literal(node) or ""
     if word.startswith(("service:", "container:")):
         found = c.other(key, word.removeprefix("service:"), node.span)
@@ -240,7 +234,6 @@ def _volumes(c: Container) -> Any:
 
 
 def _image(c: Container, node: Node) -> Any:
-    """The image of the file, unless a pipeline sets another one."""
     return f"${{{image_variable(c.name)}:-{text(plain(node))}}}"
 
 
@@ -282,7 +275,6 @@ def _build(c: Container, node: Node) -> Any:
 
 
 def _context(c: Container, span: Span, context: str) -> str:
-    """What is built: a folder of the repository, an image or a URL."""
     paths = c.project.paths
     is_here = any((place / context).exists() for place in (paths.folder, *paths.roots)) if "\0" not in context else True
     if context.startswith(_REMOTE) and ".." not in context.split("/") and not is_here:

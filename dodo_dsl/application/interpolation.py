@@ -46,12 +46,10 @@ def split_outside(text: str, sign: str) -> list[str]:
 
 
 def names(text: str) -> set[str]:
-    """The variables in a string, those in defaults included."""
     return {match[1] for match in _VARIABLE_NAME.finditer(text) if match[1]}
 
 
 def without_default(text: str) -> set[str]:
-    """The variables in a string that have no default there."""
     return {match[1] or match[2] for match in _BARE_NAME.finditer(text) if match[0] != "$$"}
 
 
@@ -60,8 +58,6 @@ class EnvironmentProblem(ValueError):
 
 
 class RequiredVariable(EnvironmentProblem):
-    """The required variable ``name``, and ``why`` its file requires it."""
-
     def __init__(self, name: str, why: str) -> None:
         self.name, self.why = name, why or "it is required"
         super().__init__(f"variable {name} is not set: {self.why}")
@@ -81,7 +77,6 @@ def filled(text: str, known: Mapping[str, str], late: Callable[[str], bool] = _n
 
 
 def _replaced(text: str, change: Callable[[re.Match[str]], str]) -> str:
-    """The text with ``change`` applied to each of its variables."""
     parts, place = [], 0
     while (dollar := text.find("$", place)) >= 0:
         end = end_of_variable(text, dollar)
@@ -146,8 +141,6 @@ def _slip(written: str) -> tuple[str, str]:
 
 
 class DotenvProblem(EnvironmentProblem):
-    """What compose refuses in a file of variables, at ``line``."""
-
     def __init__(self, text: str, place: int, what: str, hint: str) -> None:
         self.line, self.what, self.hint = text.count("\n", 0, place) + 1, what, hint
         super().__init__(f"line {self.line}: {what}; {hint}")
@@ -231,7 +224,6 @@ def escaped(text: str) -> str:
 
 
 def mapped_texts(value: Any, change: Callable[[str], str]) -> Any:
-    """Values of JSON with ``change`` applied to each text."""
     if isinstance(value, dict):
         return {key: mapped_texts(each, change) for key, each in value.items()}
     if isinstance(value, list):

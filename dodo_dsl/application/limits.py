@@ -50,7 +50,6 @@ def number(value: object) -> float:
 
 
 def whole(value: object) -> float:
-    """A whole number, as compose reads it."""
     found = number(value)
     return math.floor(found) if math.isfinite(found) else found
 
@@ -94,7 +93,6 @@ def ulimits(c: "Container", node: Node | None = None) -> dict[str, Any]:
 
 
 def deploy(c: "Container", node: Node) -> Any:
-    """Limits as those of the service, and reservations of graphics processors."""
     what = f"'deploy' of '{c.name}'"
     left = "endpoint_mode labels mode replicas rollback_config update_config placement restart_policy"
     resources = c.fields(c.fields(node, what, "resources", left).get("resources"), what, "limits reservations")

@@ -75,7 +75,6 @@ def _without_bound(document: source.Mapping) -> source.Mapping:
 
 
 def _changed(document: source.Mapping, change: Callable[[str, Node], Node]) -> source.Mapping:
-    """A file with other services."""
     services = document.get("services")
     if not isinstance(services, source.Mapping):
         return document
@@ -92,7 +91,6 @@ def _with_context(service: Node, here: str) -> Node:
 
 
 def _whole(files: ComposeFiles, file: Path, folder: Path, chain: tuple[Path, ...]) -> source.Mapping | None:
-    """A file with what it extends and includes."""
     document = files.document(file, folder)
     if document is None:
         return None
@@ -106,7 +104,6 @@ def _whole(files: ComposeFiles, file: Path, folder: Path, chain: tuple[Path, ...
 
 
 def _included(files: ComposeFiles, item: Node, folder: Path, chain: tuple[Path, ...]) -> source.Mapping | None:
-    """What an item of ``include`` brings, whose paths are relative to ``folder``."""
     names = scalars(source.part(item, "path") if isinstance(item, source.Mapping) else item)
     if not names:
         files.problem(item.span, "'include' does not name a file", "for example include: [sensors.yml]")
@@ -145,7 +142,6 @@ class Service(NamedTuple):
 
 
 def _extended(files: ComposeFiles, chain: tuple[Service, ...], node: Node) -> Node:
-    """The last service of a chain merged over what it extends."""
     if not isinstance(node, source.Mapping) or "extends" not in node.entries or files.full:
         return node
     own = source.Mapping(node.span, {k: e for k, e in node.entries.items() if k != "extends"}, node.tag)
@@ -180,7 +176,6 @@ def _base(files: ComposeFiles, entry: Entry, chain: tuple[Service, ...]) -> Node
 
 
 def overrides(paths: Sequence[Path]) -> Iterator[Diagnostic]:
-    """A warning if compose would read an override file together with the one file of ``paths``."""
     first = paths[0]
     if len(paths) == 1 and first.name in _OVERRIDDEN:
         for found in sorted(first.parent.glob("*compose.override.y*ml"))[:1]:

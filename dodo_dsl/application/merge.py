@@ -23,7 +23,6 @@ def merged(base: Node, over: Node) -> Node:
 
 
 def merged_service(base: Node, over: Node) -> Node:
-    """Two definitions of one service as one."""
     return _merge(base, over, ("services", ""))
 
 
@@ -105,7 +104,6 @@ def _appended(base: Sequence, over: Sequence, place: Place) -> tuple[Node, ...]:
 
 
 def _target(item: Node) -> str:
-    """The path of a mount, device, secret or config in the container."""
     value = plain(item)
     if isinstance(value, dict):
         return str(value.get("target", value.get("source")))
@@ -123,7 +121,6 @@ def _as_pairs(node: Node) -> Node:
 
 
 def _texts(node: Sequence) -> list[Scalar] | None:
-    """The items of a list that has texts alone."""
     found = [item for item in node.items if isinstance(item, Scalar) and isinstance(item.value, str)]
     return found if len(found) == len(node.items) else None
 
@@ -229,7 +226,6 @@ def changed(node: Node, change: Callable[[Scalar, Place], str], place: Place = (
 
 
 def filled_node(node: Node, known: abc.Mapping[str, str], late: Callable[[str], bool]) -> Node:
-    """A node with its variables filled in."""
     return changed(node, lambda word, *_: filled(str(word.value), known, late))
 
 

@@ -62,7 +62,6 @@ class PrintedLine:
 
     @property
     def port(self) -> str:
-        """The message as other keys of ``x-dodo`` name it."""
         return f"{self.message}/{self.sender}" if self.sender else self.message
 
 
@@ -116,7 +115,6 @@ class ComposeService:
 
     @functools.cached_property
     def words(self) -> tuple[tuple[str, Scalar], ...]:
-        """The words of its commands, each with the value in which it is written."""
         return tuple(word for key in COMMANDS for word in words_of(self.node.get(key)))
 
     @functools.cached_property
@@ -126,7 +124,6 @@ class ComposeService:
 
     @property
     def has_display(self) -> bool:
-        """Whether its process is to have an X server."""
         display = source.part(self.node, KEYS[0], "display")
         return isinstance(display, Scalar) and display.value is True
 
@@ -155,7 +152,6 @@ class ApplicationSource:
 
     @property
     def rest(self) -> Mapping[str, Node]:
-        """The top-level keys that a test carries beside services."""
         return {key: entry.value for key, entry in self.top.items() if key in ("volumes", "secrets", "configs")}
 
     @functools.cached_property
@@ -171,24 +167,20 @@ class ApplicationSource:
         )
 
     def is_late(self, name: str) -> bool:
-        """Whether a variable has its value only when a test runs: one that is passed, or a secret."""
         return is_late(name, (*self.access.passed, *self.secrets))
 
     @property
     def cid(self) -> int | None:
-        """The CID that is built into the application, so that its tests use it."""
         values = [cid.value for cid in self.cids if isinstance(cid.value, int)]
         return values[0] if values else None
 
     @functools.cached_property
     def paths(self) -> HostPaths:
-        """The host's paths as the application may use them."""
         roots = (*repository(self.folder), *self.other_roots)
         return HostPaths(self.folder, roots, tuple(map(Path, self.access.paths)))
 
     @functools.cached_property
     def other_roots(self) -> tuple[Path, ...]:
-        """The folders besides its repository whose files are the application's own."""
         own = repository(self.folder)
         return tuple(root for root in map(Path, self.access.roots) if root not in own)
 
@@ -198,7 +190,6 @@ class ApplicationSource:
 
     @property
     def declared(self) -> Mapping[str, Declared | None]:
-        """The declarations of each service, by its name; those of nodes without topics are empty."""
         return {
             name: service.declared or (Declared((), (), (), None, 0, service.span) if self.speaks_ros else None)
             for name, service in self.services.items()
@@ -206,17 +197,14 @@ class ApplicationSource:
 
     @property
     def speaks_ros(self) -> bool:
-        """Whether services of it are ROS 2 nodes, so that it has the bridge beside them."""
         return any(service.declared and service.declared.topics for service in self.services.values())
 
 
 def is_true(value: object) -> bool:
-    """Whether compose reads a value as true."""
     return value is True or (isinstance(value, str) and value.strip().lower() not in _FALSE)
 
 
 def references(service: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """The services that a service needs, each with its key."""
     for key in NAMESPACES:
         kind, _, name = str(service.get(key)).partition(":")
         if kind == "service":
@@ -269,13 +257,11 @@ def words_of(node: Node | None) -> Iterator[tuple[str, Scalar]]:
 
 
 def declared_cid(node: source.Mapping) -> Scalar | None:
-    """What ``x-dodo`` of a document or of a service says to be built in."""
     cid = source.part(node, "x-dodo", "cid")
     return cid if isinstance(cid, Scalar) else None
 
 
 def declared(service: source.Mapping) -> Declared | None:
-    """The declaration of a service; None without ``x-dodo``."""
     entry = service.entries.get("x-dodo")
     if entry is None or not isinstance(entry.value, source.Mapping):
         return None
@@ -309,18 +295,15 @@ def printed_lines(node: Node | None) -> Iterator[PrintedLine]:
 
 
 def scalars(node: Node | None) -> list[Scalar]:
-    """The strings of a list, or the single string."""
     nodes = node.items if isinstance(node, source.Sequence) else (node,)
     return [n for n in nodes if isinstance(n, Scalar) and isinstance(n.value, str)]
 
 
 def image_variable(service: str) -> str:
-    """The variable with which a pipeline sets a service's image."""
     return "DODO_IMAGE_" + re.sub(r"[^A-Z0-9_]", "_", service.upper())
 
 
 def env_files(service: source.Mapping, folder: Path) -> Iterator[EnvFile]:
-    """The files of ``env_file``, which are relative to ``folder``."""
     node = service.get("env_file")
     for item in node.items if isinstance(node, source.Sequence) else ():
         path, required, kind = (source.part(item, key) for key in ("path", "required", "format"))

@@ -44,7 +44,6 @@ class Mount:
     is_own: bool = False
 
     def written(self) -> str | dict[str, Any]:
-        """As compose reads it."""
         source, target = escaped(self.source), escaped(self.target)
         words = [*(["ro"] if self.read_only else []), *(["nocopy"] if self.nocopy else [])]
         if ":" not in f"{source}{target}" and len(source) != 1 and not self.is_required and self.kind != "tmpfs":
@@ -62,7 +61,6 @@ def own_name(name: str) -> str:
 
 
 def mounts(of: "Container", node: Node) -> list[Mount]:
-    """The mounts of a service."""
     read = [_read(of, item) for item in of.items(node) if isinstance(item, Mapping)]
     return [mount for each in read if each and (mount := _carried(of, each))]
 
@@ -109,7 +107,6 @@ def _memory(of: "Container", node: Node | None) -> tuple[tuple[str, Any], ...]:
 
 
 def _carried(of: "Container", mount: Mount) -> Mount | None:
-    """The mount as the test has it; None where it has none."""
     if mount.kind == "bind":
         return _bound(of, mount)
     known = of.project.volumes

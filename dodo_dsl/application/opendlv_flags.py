@@ -65,7 +65,6 @@ def split(command: str) -> tuple[str, ...]:
 
 
 def _end_of_dollar(command: str, place: int) -> int:
-    """The end of a variable, or of the parentheses after ``$``."""
     end = end_of_variable(command, place)
     if command[end : end + 1] == "(":
         closing = command.find(")", end)
@@ -79,7 +78,6 @@ def _map_flag(argv: Sequence[str], flag: str, change: Callable[[str], str]) -> t
 
 
 def takes_cid(argv: Iterable[str], environment: Mapping[str, object]) -> bool:
-    """Whether a CID can be set: by flag, also within a shell's string, or by variable."""
     return any(_CID.search(w) or w == "--cid" or names(w) & {*CID_VARIABLES} for w in argv) or any(
         variable in environment for variable in CID_VARIABLES
     )
@@ -98,7 +96,6 @@ def takes_memory(argv: Sequence[str]) -> bool:
 
 
 def memories(argv: Iterable[str]) -> list[str]:
-    """The names of the shared memories that a command asks for, without a leading slash."""
     return [match["name"].removeprefix("/") for word in argv if (match := _MEMORY.match(word))]
 
 
@@ -144,7 +141,6 @@ class AskedPictures:
 
 
 def pictures_of(application: "ApplicationSource") -> list[AskedPictures]:
-    """Of each service that asks for a memory."""
     found = (_of(service) for service in application.services.values())
     return [each for each in found if each.formats]
 

@@ -90,7 +90,6 @@ class Part:
         return escaped(self.project.rebased(found))
 
     def items(self, node: Node) -> Iterator[Node]:
-        """The items of a list, or the single value."""
         yield from (i for i in (node.items if isinstance(node, source.Sequence) else (node,)) if is_set(i))
 
     def fields(

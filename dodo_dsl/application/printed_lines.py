@@ -43,7 +43,6 @@ def compiled(pattern: str) -> Any:
 
 
 def line_problems(line: PrintedLine, known: Mapping[str, Definition]) -> Iterator[Diagnostic]:
-    """What is wrong with a pattern and its groups; ``known`` are the messages, an unknown one is another rule's."""
     name, slash, stamp = line.message.partition("/")
     if slash or name.startswith(("dodo.", "cluon.")):
         message = f"'{line.message[:80]}' is not the name of a message that an application sends"

@@ -120,7 +120,6 @@ def as_written(path: Path) -> ApplicationSource | None:
 
 
 def _links(paths: Sequence[Path]) -> Iterator[Diagnostic]:
-    """Files that symbolic links lead out of the repository in which they are named."""
     for path in paths:
         if out := link_out(path):
             message = f"the file is a symbolic link to '{out}', outside the repository"
@@ -161,7 +160,6 @@ def _declared_in(document: Mapping, declarations: Declarations, gone: dict[str, 
 
 
 def _declared(service: Node, about: Entry) -> Node:
-    """A service of a compose file with the keys of ``dodo.yml`` in place of its own ones."""
     if not isinstance(service, Mapping) or not isinstance(about.value, Mapping):
         return service
     keys = {key: entry for key, entry in about.value.entries.items() if key != PROCESS}
@@ -173,14 +171,12 @@ def _declared(service: Node, about: Entry) -> Node:
 
 
 def _both(old: Node | None, new: dict[str, Entry], span: Span) -> Mapping:
-    """A mapping with other values of keys, at ``span`` if there is none."""
     return Mapping(old.span if old else span, {**entries(old), **new})
 
 
 def _declaration_problems(
     services: dict[str, Entry], declarations: Declarations, gone: dict[str, str]
 ) -> Iterator[Diagnostic]:
-    """Unknown services, and those that are left out and declared."""
     named = [(word.text, word.span) for word in declarations.without]
     named += [(name, entry.key) for name, entry in declarations.services.items()]
     for name, span in named:

@@ -47,7 +47,6 @@ class RosTopic:
 
     @property
     def messages(self) -> tuple[Word, ...]:
-        """The messages that a sent topic becomes, by what is written or by its type."""
         return self.ports or tuple((name, self.span) for name in SENT.get(self.topic.type, ()))
 
 
@@ -88,7 +87,6 @@ def variables(cid: int, *, own_network: bool) -> tuple[dict[str, str], dict[str,
 
 
 def bridge() -> source.Mapping:
-    """The bridge as a service of a compose file; a test gives it its topics."""
     node, problems = source.parse(_NODE, BRIDGE)
     assert isinstance(node, source.Mapping), problems
     return node

@@ -40,17 +40,14 @@ _KINDS = {"url": "an address with a password", "key": "a private key", "token": 
 
 
 def is_secret(name: str) -> bool:
-    """Whether a variable's name is one of a secret, in whatever case it is written."""
     return _matches(name, PATTERNS) and not _matches(name, _NO_SECRETS)
 
 
 def is_of_pipeline(name: str) -> bool:
-    """Whether GitLab sets the variable for its own jobs."""
     return _matches(name, (PIPELINE,))
 
 
 def holds_secret(name: str, value: str) -> bool:
-    """The same with a look at the value."""
     return is_secret(name) or bool(secret_kind(value))
 
 

@@ -44,7 +44,6 @@ _SHELLS = ("sh", "ash", "bash", "dash", "zsh")
 
 
 def parts(application: ApplicationSource) -> dict[str, tuple[str, Part]]:
-    """The services of the stack that the application starts, each with the name under which it is known."""
     return {
         service.name: (name, row)
         for service in application.services.values()
@@ -68,7 +67,6 @@ def _names(service: ComposeService) -> Iterator[str]:
 
 
 def _program(words: Sequence[str]) -> str:
-    """The program that a command starts, also as the only one of a shell."""
     name = words[0].rpartition("/")[2] if words else ""
     if name in _SHELLS and len(words) == 3 and not {*";&|\n"} & {*words[2]}:
         return _program(words[2].split())

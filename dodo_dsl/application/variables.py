@@ -42,7 +42,6 @@ def split_by(application: ApplicationSource, name: str, value: str) -> str:
 
 
 def with_variables(application: ApplicationSource, values: Mapping[str, str]) -> ApplicationSource:
-    """The application with the variables of a test in the commands of its services."""
     if not values:
         return application
     known = {**application.known, **values}
@@ -129,7 +128,6 @@ def tunables(application: ApplicationSource) -> tuple[Range, ...]:
 
 
 def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
-    """Parameters that are DoDo's own, without a range, or with different ones at several services."""
     seen: dict[str, list[str]] = {}
     for service in application.services.values():
         for name, entry in source.entries(service.node, "x-dodo", "tune").items():

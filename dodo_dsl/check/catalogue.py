@@ -30,8 +30,6 @@ another file.
 
 @dataclass(frozen=True)
 class Page:
-    """One rule; ``encoding`` is that of the bad example's files."""
-
     name: str
     group: str
     summary: str
@@ -42,7 +40,6 @@ class Page:
 
 @functools.cache
 def pages() -> dict[str, Page]:
-    """Every rule by name, in the catalogue's order."""
     node, problems = read(FILE)
     if node is None or problems:
         raise ValueError(f"{FILE.name}: {problems}")
@@ -60,14 +57,12 @@ def _page(name: str, group: str, summary: str, why: str = "", bad: str = "", dri
 
 
 def text(page: Page) -> str:
-    """A rule's page for a terminal."""
     parts = [f"{page.name}: {page.summary}", textwrap.fill(page.why, 100)]
     parts += ["This violates the rule:", textwrap.indent(page.bad, "    ")]
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
 def markdown() -> str:
-    """The text of docs/reference/rules.md."""
     return "\n".join((_INTRODUCTION, *_sections()))
 
 
@@ -81,5 +76,4 @@ def _sections() -> Iterator[str]:
 
 
 def write(file: Path) -> None:
-    """Generates docs/reference/rules.md."""
     atomic.write_text(file, markdown())

@@ -36,7 +36,6 @@ def check_files(context: RuleContext) -> Iterator[Diagnostic]:
 
 
 def needed(parameter: Parameter, path: Path, root: Path) -> Mapping[str, Path] | str:
-    """The files that a parameter's path needs."""
     is_map = parameter.format == "map" and path.suffix == ".json"  # its meshes stand beside it
     return files(path.parent if is_map else path, root)
 
@@ -68,7 +67,6 @@ def is_own(diagnostic: Diagnostic) -> bool:
 
 
 def file_problems(context: RuleContext, service: ResolvedService, argument: Argument) -> tuple[Diagnostic, ...]:
-    """The problems of the file that a parameter names; none without a format."""
     name, path = argument.parameter.format, argument.value.path if argument.value else None
     if not name or path is None:
         return ()
@@ -80,7 +78,6 @@ def file_problems(context: RuleContext, service: ResolvedService, argument: Argu
 def problems(
     name: str, path: Path, given: tuple[tuple[str, str], ...], own: tuple[Path, ...]
 ) -> tuple[Diagnostic, ...]:
-    """The problems of a file of a format, for parameters of the service and files with messages."""
     ids: Mapping[str, int] = known_ids(own)
     return tuple(
         _diagnostic(error, formats.FORMATS[name].help) for error in formats.problems(name, path, dict(given), ids)
@@ -205,7 +202,6 @@ def check_input(context: RuleContext) -> Iterator[Diagnostic]:
 
 
 def _times(service: ResolvedService, player: ResolvedService | None, unsure: Severity) -> Iterator[Unmet]:
-    """Times of the target and of samples that never meet."""
     is_copied = service.texts.get("align") == "sample-time" and "target" in service.texts
     if player and "align" in service.texts and player.texts.get("sample-times") == "recorded" and not is_copied:
         why = f"expects samples with times of the test, and frames of '{player.use.name}' keep those of the recording"

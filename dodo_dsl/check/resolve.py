@@ -94,7 +94,6 @@ def _former_ids() -> frozenset[tuple[str, int]]:
 
 
 def without_pictures(service: ResolvedService) -> bool:
-    """Whether a service plays a recording that has no frames."""
     path = _recording(service)
     return path is not None and not holds(path, known_ids(())[IMAGE], _NO_STAMP)
 
@@ -126,7 +125,6 @@ def holds(path: Path, number: int, stamp: int) -> bool:
 
 @functools.cache
 def known_ids(own: tuple[Path, ...]) -> Mapping[str, int]:
-    """The numbers of these messages, by name."""
     return {name: definition.id for name, definition in known_messages(own).items()}
 
 
@@ -163,7 +161,6 @@ class ResolvedTest:
 
     @functools.cached_property
     def variables(self) -> dict[str, str]:
-        """What the spec gives variables of the application, where it is a text."""
         return {name: e.value.text for name, e in self.spec.variables.items() if isinstance(e.value, Scalar)}
 
 
@@ -178,7 +175,6 @@ def resolve(
     deployment: Deployment,
     application: ApplicationSource | None,
 ) -> list[ResolvedTest]:
-    """Each instance resolved, in the order given."""
     declared = application.declared if application else None
     found: list[ResolvedTest] = []
     known: Known = {}
@@ -239,7 +235,6 @@ def _driven(
     declared: Mapping[str, Declared | None] | None,
     types: Mapping[str, Collection[str]],
 ) -> tuple[tuple[ResolvedService, ...], Wiring]:
-    """Services and wiring where the messages that drive the vehicle have taken the place of defaults."""
     messages = ",".join(driving(wiring))
     is_driving = operator.attrgetter("parameter.driving")
     found = tuple(_with_default(each, messages, is_driving) for each in services) if messages else services
@@ -278,7 +273,6 @@ class RuleContext:
 
     @property
     def rig(self) -> Rig | None:
-        """The rig of a hil test, when the deployment has it."""
         return self.test.rig
 
     @property

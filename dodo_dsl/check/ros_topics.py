@@ -68,7 +68,6 @@ class Sources:
     own: Mapping[str, Collection[str]] = field(default_factory=dict)
 
     def resolve(self, declared: Mapping[str, Declared | None]) -> tuple[Resolved, ...]:
-        """All topics of an application."""
         topics = [Resolved(name, topic) for name, each in declared.items() if each for topic in each.topics]
         found = tuple(map(self._resolved, topics))
         seen = {each.maker.use.name: each.maker for each in found if each.is_picture and each.maker}
@@ -170,13 +169,11 @@ def _ambiguous(it: Resolved, names: Sequence[str]) -> Resolved:
 
 
 def _format(memory: str, camera: ResolvedService | None) -> str:
-    """The format of a memory, by the parameter that names it."""
     named = (key for key, text in (camera.texts if camera else {}).items() if text == memory)
     return next((key.removeprefix("name.") for key in named if key.startswith("name.")), memory.rpartition(".")[2])
 
 
 def problems(topics: Iterable[Resolved]) -> Iterator[Diagnostic]:
-    """What is wrong with topics, each and together."""
     first: dict[str, Resolved] = {}
     sent: dict[str, str] = {}
     for each in topics:
@@ -195,7 +192,6 @@ def problems(topics: Iterable[Resolved]) -> Iterator[Diagnostic]:
 
 
 def graph(resolved: Sequence[Resolved]) -> RosGraph:
-    """The topics that a test has, each once."""
     known = {each.written.topic.topic: each for each in resolved if each.bus and not each.problem}
     services: dict[str, tuple[str, ...]] = {}
     for each in resolved:

@@ -35,7 +35,6 @@ def senders(test: ResolvedTest) -> tuple[str, ...]:
 
 
 def truth(test: ResolvedTest) -> tuple[str, ...]:
-    """The messages of the test's services by which it judges the application."""
     ports = (end.port for end in test.wiring.consumed if test.wiring.is_truth(end.port))
     return tuple(sorted({str(port) for port in ports}))
 

@@ -90,7 +90,6 @@ def _without_effect(service: ResolvedService, argument: Argument, entry: Entry) 
 
 
 def _needs(service: ResolvedService, name: str) -> bool:
-    """Whether a parameter is required of a service, and not written there."""
     parameter = service.manifest.parameters.get(name)
     return parameter is not None and parameter.required and name not in service.use.parameters
 
@@ -180,7 +179,6 @@ def _lines(context: RuleContext, lines: Collection[PrintedLine]) -> Iterator[Dia
 
 
 def unknown_message(name: str, known: Collection[str], span: Span) -> Iterator[Diagnostic]:
-    """The problem of a name that is none of the ``known`` messages."""
     if name and name not in known:
         hint = did_you_mean(name, known) or "add the files of your own messages under 'messages' in dodo.yml"
         yield Diagnostic(span, "unknown-message", f"unknown message '{name[:80]}'", hint)
@@ -208,7 +206,6 @@ _OPTICS = "camera.intrinsics"
 
 
 def check_cameras(context: RuleContext) -> Iterator[Diagnostic]:
-    """Services that take optics from the rig and work on frames of another size."""
     rig = context.rig
     for service in context.services if rig else ():
         assert rig is not None

@@ -207,7 +207,6 @@ def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal | Diagnostic | No
 
 
 def _units(test: ResolvedTest) -> dict[str, str]:
-    """Those of all checks by name."""
     found = dict(_OF_THE_TEST)
     for service in test.services:
         found.update(service.manifest.checks)
@@ -241,7 +240,6 @@ def check_suite(
 
 
 def reserved_cid(test: ResolvedTest, application: ApplicationSource | None) -> int | None:
-    """The CID of a test's rig, or that which is built into the application."""
     if test.rig and test.rig.cid is not None:
         return test.rig.cid
     return application.cid if application else None

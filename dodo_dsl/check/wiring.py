@@ -42,7 +42,6 @@ class Port:
         return self.name if self.stamp is None else f"{self.name}/{self.stamp}"
 
     def consumes(self, other: "Port") -> bool:
-        """Whether what is produced at ``other`` is consumed here."""
         if other.name == ANYTHING:
             return True
         same = (self.kind, self.name) == (other.kind, other.name)
@@ -97,7 +96,6 @@ class Wiring:
     alternatives: tuple[End, ...] = ()
 
     def producers(self, port: Port) -> list[End]:
-        """The test's services that produce what a port consumes."""
         found = [end for end in self.produced if port.consumes(end.port)]
         return [end for end in found if end.port.name != ANYTHING or (end.service, str(port)) not in self.unsent]
 
@@ -118,7 +116,6 @@ class Wiring:
         return open_ended or any(port.consumes(end.port) for end in self.application_produces)
 
     def required(self) -> list[End]:
-        """What the test's services consume and none of them produces."""
         return [end for end in self.consumed if not self.producers(end.port)]
 
 
@@ -227,7 +224,6 @@ _CLOSE = Decimal("1e-6")
 
 
 def cameras_of(wiring: Wiring) -> set[str]:
-    """The services that produce frames."""
     return {end.service for end in wiring.produced if end.port.kind == "memory"}
 
 
@@ -272,7 +268,6 @@ def answers(wiring: Wiring) -> list[str]:
 
 
 def driving(wiring: Wiring) -> list[str]:
-    """The messages of the application that drive the vehicle, each once."""
     return _names(end for end in _expected(wiring) if end.layer == "action")
 
 
@@ -283,7 +278,6 @@ def _expected(wiring: Wiring) -> list[End]:
 
 
 def other_inputs(wiring: Wiring) -> list[str]:
-    """Other messages of the application that services of the test consume."""
     chosen = answers(wiring)
     return [name for name in _names(_from_application(wiring)) if name not in chosen]
 

@@ -39,7 +39,6 @@ def check_producers(context: RuleContext) -> Iterator[Diagnostic]:
 
 
 def check_topics(context: RuleContext) -> Iterator[Diagnostic]:
-    """``ros-topic``, ``ros-type`` and ``ros-source``."""
     if not context.test.is_complete:
         return
     for each in context.wiring.topics:
@@ -81,7 +80,6 @@ def _unsatisfied(context: RuleContext, wiring: Wiring, end: End) -> Diagnostic:
 
 
 def _who_could(context: RuleContext, wiring: Wiring, end: End) -> str:
-    """A hint: another sender stamp that is sent, or services that send such messages."""
     stamps = sorted(str(e.port) for e in wiring.produced if e.port.name == end.port.name)
     if stamps:
         return f"the test sends {' and '.join(stamps)}"
@@ -152,7 +150,6 @@ def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
 
 
 def readers(application: ApplicationSource, names: Collection[str]) -> list[str]:
-    """The services of an application that ask for one of these memories."""
     services = application.services.values()
     return [each.name for each in services if not set(names).isdisjoint(_asked(each))]
 

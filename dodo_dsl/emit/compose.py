@@ -32,7 +32,6 @@ _CONFINED = {"read_only": True, "cap_drop": ["ALL"], "security_opt": ["no-new-pr
 
 
 def layer(plan: Plan, name: str) -> dict[str, Any]:
-    """A layer's compose file; its services wait for the layers before it."""
     is_first, own_network = name == LAYERS[0], plan.isolation == "network"
     added: dict[str, Any] = {SANDBOX: _sandbox(plan)} if is_first and own_network else {}
     added |= {FILES_SERVICE: _files(plan)} if is_first and plan.application.copies else {}
@@ -92,7 +91,6 @@ def _sandbox(plan: Plan) -> dict[str, Any]:
 
 
 def _files(plan: Plan) -> dict[str, Any]:
-    """It copies folders of the repository into volumes, which the application may change."""
     volumes: list[dict[str, Any]] = []
     for name, source in plan.application.copies.items():
         volumes.append({**FILES_MOUNT, "source": source, "target": f"/from/{name}"})

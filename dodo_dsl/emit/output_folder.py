@@ -30,7 +30,6 @@ _Entries = Mapping[str, str | Path | _Link]
 
 
 def _of_test(compiled: Compiled, plan: Plan, images: Sequence[str] = ()) -> _Entries:
-    """Everything in the folder of a test; ``images`` are further lines of its ``.env``."""
     texts = {file.path.partition("/")[2]: file.text for file in render_plan(plan)}
     texts[".env"] += "".join(f"{line}\n" for line in images)
     copies = compiled.copies[plan.slug]
@@ -38,7 +37,6 @@ def _of_test(compiled: Compiled, plan: Plan, images: Sequence[str] = ()) -> _Ent
 
 
 def _of_all(compiled: Compiled) -> _Entries:
-    """The files that tests share; the name depends on the content."""
     return {copy.shared: copy.source for copies in compiled.copies.values() for copy in copies if copy.shared}
 
 
@@ -77,7 +75,6 @@ def _is_ours(folder: Path) -> bool:
 
 
 def _replace(folder: Path, wanted: _Entries) -> None:
-    """The folder appears as a whole, unless all in it is there already."""
     if not wanted:
         shutil.rmtree(folder, ignore_errors=True)
     elif _changed(folder, wanted):
@@ -123,7 +120,6 @@ def _open_to_containers(folder: Path) -> None:
 
 
 def stale_folders(compiled: Compiled, out: Path) -> list[Path]:
-    """Tests of earlier compilations that are not in this one."""
     slugs = {plan.slug for plan in compiled.suite.plans}
     folders = [path.parent for path in sorted(out.glob(f"*/{PLAN_FILE}"))]
     return [folder for folder in folders if folder.name not in slugs and not folder.is_symlink() and _is_ours(folder)]

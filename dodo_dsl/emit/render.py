@@ -26,7 +26,6 @@ class File:
 
 
 def render_plan(plan: Plan) -> list[File]:
-    """The compose layers, ``compose.yaml`` and ``.env`` that name them, and ``test.json`` of one test."""
     return [File(f"{plan.slug}/{name}", text) for name, text in _files(plan)]
 
 

@@ -41,7 +41,6 @@ def cids(isolations: Sequence[str], available: Sequence[int]) -> list[int]:
 
 
 def subnets(network: ipaddress.IPv4Network, length: int = SMALLEST) -> list[str]:
-    """Every subnet of a length in the deployment's network, in order."""
     return [str(part) for part in network.subnets(new_prefix=length)] if length >= network.prefixlen else []
 
 
@@ -79,6 +78,5 @@ class Subnets:
 
 
 def _parts(index: int, length: int) -> range:
-    """The subnets of the smallest size in the ``index``-th one of a length."""
     size = 1 << (SMALLEST - length)
     return range(index * size, (index + 1) * size)

@@ -39,8 +39,6 @@ _MOST_OF_TOPICS = 120_000
 
 @dataclass(frozen=True)
 class Compiled:
-    """A suite with the files that each test needs, by slug."""
-
     suite: Suite
     copies: Mapping[str, tuple[FileCopy, ...]]
 
@@ -298,7 +296,6 @@ class _Builder:
 
 
 def _ros_type(number: int, path: Path) -> tuple[str, str]:
-    """The place of a type of ROS below a folder, by which it is named, and its text."""
     from dodo_dsl.opendlv.ros_codec import own_name
 
     name = f"{number}/{path.name}" if path.suffix == ".idl" else f"{own_name(path)}.msg"
@@ -306,7 +303,6 @@ def _ros_type(number: int, path: Path) -> tuple[str, str]:
 
 
 def _leaving_out(flag: Flag, messages: Sequence[str]) -> Flag:
-    """The flag of a recording's messages that are not played, with others of them."""
     if flag.name != WITHOUT or not messages:
         return flag
     return replace(flag, value=",".join([*(word for word in flag.value.split(",") if word), *messages]))

@@ -196,7 +196,6 @@ class Plan:
 
     @property
     def is_real(self) -> bool:
-        """Whether a test runs on hardware, which has its own CID."""
         return bool(self.rig) and not self.emulated and self.rig not in EMULATED_RIGS
 
     @property
@@ -232,14 +231,11 @@ class Plan:
 
 @dataclass(frozen=True)
 class Suite:
-    """All instances of a compilation, in name order."""
-
     plans: tuple[Plan, ...]
     gates: bool = True
 
 
 def is_device(path: str) -> bool:
-    """Whether a string is the path of a device file below /dev."""
     return bool(_DEVICE.fullmatch(path))
 
 

@@ -43,7 +43,6 @@ class FileCopy:
 
 
 def is_shared_name(name: str) -> bool:
-    """Whether DoDo calls a shared file so."""
     return _NAME.fullmatch(name) is not None
 
 

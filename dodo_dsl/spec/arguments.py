@@ -62,7 +62,6 @@ def convert(parameter: Parameter, node: Node, root: Path) -> Value:
 
 
 def default_value(parameter: Parameter) -> Value | None:
-    """The manifest's default as the flag's value."""
     default = parameter.default
     if default is None:
         return None
@@ -221,7 +220,6 @@ class ResolvedService:
 
     @functools.cached_property
     def messages(self) -> Ports:
-        """The messages that it consumes and produces with these arguments."""
         return self.manifest.messages_with(self.texts)
 
     @functools.cached_property

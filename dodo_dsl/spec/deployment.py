@@ -46,7 +46,6 @@ class Declarations:
 
     @classmethod
     def of(cls, entry: Entry | None, files: tuple[Path, ...]) -> "Declarations":
-        """Those of a valid ``application``."""
         node = entry.value if entry else None
         own = {key: e for key, e in entries(node).items() if key not in ("files", "without", "services")}
         return cls(files, tuple(_texts(part(node, "without"))), dict(entries(node, "services")), own)
@@ -84,7 +83,6 @@ class Deployment:
     sandbox: SandboxLimits = field(default_factory=SandboxLimits)
 
     def rig(self, name: str) -> Rig | None:
-        """A rig of the deployment, or an emulated one."""
         return self.rigs.get(name) or (rig.emulated(name) if name in rig.EMULATED_RIGS else None)
 
 
@@ -132,8 +130,6 @@ def _texts(node: Node | None) -> list[Scalar]:
 
 
 class _Reading:
-    """What a valid ``dodo.yml`` says, and the problems of what it names."""
-
     def __init__(self, root: Path, node: Mapping) -> None:
         self.root, self.node, self.raw = root, node, plain(node)
         self.problems: list[Diagnostic] = []
@@ -177,7 +173,6 @@ class _Reading:
         self.problems.append(Diagnostic(span, rule, message, hint, severity))
 
     def _folders(self, key: str, hint: str = _FROM_HERE) -> dict[Path, Scalar]:
-        """Those that there are, and where they are named."""
         folders = {}
         for item in _texts(self.node.get(key)):
             folder = package_data.registry() if item.text == SHIPPED else path_of(self.root, item.text)

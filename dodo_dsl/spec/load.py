@@ -33,7 +33,6 @@ _MOST_WRONG = 20
 
 
 def load_spec(location: Location, reader: Reader = read) -> Loaded:
-    """The instances of a file, as far as it can be read, and its problems."""
     node, found = reader(location.path)
     if node is None:
         return [Spec(location)], found or [_nothing_in(location.path)]
@@ -48,7 +47,6 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
 
 
 def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
-    """The instances of a test that is merged over what it extends."""
     choices, found = matrix.choices(node)
     of_matrix = list(matrix.PLACEHOLDERS.unknown(node))
     of_ranges = list(vary.PLACEHOLDERS.unknown(node))
@@ -196,7 +194,6 @@ def _instance(spec: Spec, values: vary.Values) -> Mapping:
 
 
 def _at(spec: Spec, values: vary.Values) -> Spec:
-    """The spec with these values of its ranges."""
     found = spec_of(spec.location, _instance(spec, values), spec.choice, spec.spans, spec.is_whole)
     return replace(found, ranges=spec.ranges, template=spec.template)
 

@@ -154,8 +154,6 @@ class Ports:
 
 @dataclass(frozen=True)
 class Case:
-    """Ports that a service has ``when`` its parameters are so."""
-
     when: When
     ports: Ports
 
@@ -188,12 +186,10 @@ class Manifest:
     automatic: bool = False
 
     def messages_with(self, texts: Map[str, str]) -> Ports:
-        """The messages that it has where its parameters have these values, as texts."""
         return sum((case.ports for case in self.cases if holds(case.when, texts)), Ports()) + self.messages
 
     @property
     def all_messages(self) -> Ports:
-        """The messages that it may have, whatever its parameters are."""
         return sum((case.ports for case in self.cases), Ports()) + self.messages
 
     @property
@@ -215,7 +211,6 @@ def _ports(raw: dict[str, Any]) -> Ports:
 
 
 def load_manifest(path: Path) -> tuple[Manifest | None, list[Diagnostic]]:
-    """The manifest of a ``service.yml`` and its problems."""
     node, found = read(path)
     if node is None and not found:
         found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected a service's manifest")]
@@ -237,7 +232,6 @@ def _manifest(folder: Path, raw: dict[str, Any]) -> Manifest:
 
 
 def _fixed(value: Any) -> Any:
-    """With tuples for lists."""
     return tuple(map(_fixed, value)) if isinstance(value, list) else value
 
 

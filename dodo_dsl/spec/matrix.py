@@ -43,12 +43,10 @@ class Placeholders:
         return re.compile(rf"\$\{{{{1,2}}\s*{self.key}\b(?:\.(?P<name>[a-z][a-z0-9-]*))?[^}}]*\}}?")
 
     def names(self, node: Node) -> set[str]:
-        """The names that placeholders below a node have."""
         texts = (below.text for below in walk(node) if isinstance(below, Scalar))
         return {match["name"] for text in texts for match in self._one.finditer(text)}
 
     def used(self, node: Mapping) -> set[str]:
-        """The names that a spec uses outside the key itself."""
         return self.names(without(node, self.key))
 
     def _known(self, node: Mapping) -> dict[str, Entry]:
@@ -137,7 +135,6 @@ class Choice:
 
     @property
     def label(self) -> str:
-        """``[light=dark,speed=2]``"""
         values = (*self.values, *self.shown)
         return f"[{','.join(f'{k}={v.text}' for k, v in values)}]" if values else ""
 

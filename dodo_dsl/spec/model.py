@@ -45,8 +45,6 @@ FRAMES = (ALWAYS, ON_FAILURE, NEVER) = ("always", "on-failure", "never")
 
 @dataclass(frozen=True)
 class Use:
-    """A service in a layer: ``name: {uses: ..., with: {...}}``."""
-
     layer: str
     name: str
     span: Span
@@ -118,12 +116,10 @@ class Spec:
 
     @property
     def slug(self) -> str:
-        """The instance's name in folders, projects and jobs: ``name--light-dark``"""
         return (self.name or self.location.stem) + self.choice.slug
 
     @property
     def is_stepped(self) -> bool:
-        """Whether the world waits for the application."""
         return self.clock == LOCKSTEP
 
     def span(self, key: str) -> Span:
@@ -131,7 +127,6 @@ class Spec:
 
 
 def spec_of(location: Location, node: Mapping, choice: Choice, spans: dict[str, Span], is_whole: bool) -> Spec:
-    """An instance from its values, which are valid and have no placeholders any more."""
     known = schema_of_keys("dodo")["properties"]
     raw = {key: values(entry.value, known[key]) for key, entry in node.entries.items() if key in _VALUES}
     record, response, resources = (raw.get(key, {}) for key in ("record", "response", "resources"))

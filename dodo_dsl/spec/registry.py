@@ -55,7 +55,6 @@ def _specs_below(folder: Path) -> Iterator[Path]:
 
 
 def _is_on(device: int, folder: Path) -> bool:
-    """Whether a folder belongs to a file system, and nothing else is mounted there."""
     try:
         return folder.lstat().st_dev == device
     except OSError:

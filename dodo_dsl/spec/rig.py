@@ -70,7 +70,6 @@ class Rig:
 
     @property
     def more_tags(self) -> tuple[str, ...]:
-        """Further tags of its runner, which distinguish it from other rigs of its kind."""
         node = None if self.is_emulated else self.node.get("tags")
         texts = [item.text for item in node.items if isinstance(item, Scalar)] if isinstance(node, Sequence) else []
         own = () if self.tag == SIMULATION_TAG else KIND_TAGS[self.kind][1:]
@@ -83,17 +82,14 @@ class Rig:
 
     @property
     def privileged(self) -> bool:
-        """Whether services of an application may be privileged on this rig."""
         node = self.node.get("privileged")
         return isinstance(node, Scalar) and node.value is True and not self.is_emulated
 
     def text(self, key: str) -> str:
-        """The string at a dotted key; empty if there is none."""
         entry = self.entry(key)
         return entry.value.text if entry and isinstance(entry.value, Scalar) else ""
 
     def entry(self, key: str) -> Entry | None:
-        """The rig's entry at a dotted key such as ``camera.width``."""
         if key == CIRCLE:
             return self.node.entries.get("kind") if self.kind == CIRCLE else None
         if key == MEMORY:
@@ -103,7 +99,6 @@ class Rig:
 
     @functools.cached_property
     def _memory(self) -> Entry | None:
-        """All limits in one entry."""
         entry = self.node.entries.get("limits")
         if entry is None or not isinstance(entry.value, Mapping) or self.is_emulated:
             return None

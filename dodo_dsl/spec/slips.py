@@ -45,7 +45,6 @@ def _write(key: str, value: str) -> str:
 
 
 def in_line(value: object) -> str:
-    """YAML in one line."""
     text = str(yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=math.inf))
     return text.strip().removesuffix("\n...")
 
@@ -59,7 +58,6 @@ def to_write(key: str, schema: dict[str, Any]) -> str:
 
 
 def schema_at(schema: dict[str, Any], key: str) -> dict[str, Any]:
-    """The schema of the value at a key."""
     found = schema.get("properties", {}).get(key) or schema.get("additionalProperties")
     return found if isinstance(found, dict) else {}
 

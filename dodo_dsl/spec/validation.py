@@ -222,7 +222,6 @@ def _document(node: Node, path: Path, tagged: list[tuple[Path, Node]], is_compos
 
 
 def without_places(node: Mapping, places: Collection[Path]) -> Mapping:
-    """The same without what is at these places."""
     rest = _without(node, (), places)
     return rest if isinstance(rest, Mapping) else Mapping(node.span, {})
 

@@ -27,11 +27,9 @@ class Range:
 
     @property
     def text(self) -> str:
-        """``0.3 to 2``, or ``plain, wood``"""
         return (", " if self.is_list else " to ").join(end.text for end in self.ends)
 
     def number(self, text: str) -> Decimal:
-        """A value of a range of numbers, in its unit."""
         return _number(text, self.unit)
 
 
@@ -45,7 +43,6 @@ def _number(text: str, unit: str) -> Decimal:
 
 
 def nominal(ranges: tuple[Range, ...]) -> Values:
-    """What a plain run takes."""
     return {one.name: one.nominal for one in ranges}
 
 
