@@ -2,12 +2,10 @@
 
 import json
 import math
-import os
 import signal
 import subprocess
 import termios
 import time
-from pathlib import Path
 
 import pytest
 import serial
@@ -96,20 +94,16 @@ def test_a_port_that_keeps_dtr_up_resets_nothing(rig: Rig) -> None:
     assert rig.status() == Status.IDLE
 
 
-def test_help_ends_with_an_example_that_runs(firmware: None, tmp_path: Path) -> None:
+def test_help_ends_with_an_example_that_runs(firmware: None) -> None:
     text = subprocess.run([EMULATOR, "--help"], capture_output=True, text=True, check=True).stdout
     words = text.splitlines()[-1].removeprefix("example: ").split()
     assert words[0] == "rig-emulator" and words[-1] == "build/firmware/gantry.elf"
-    link = tmp_path / "rig"
-    process = subprocess.Popen(
-        [EMULATOR, "--link", link, ELF], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
+    process = subprocess.Popen([EMULATOR, ELF], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None and process.stdin is not None
     try:
         while "port" not in (line := process.stdout.readline()):
             assert line
-        assert os.path.realpath(link) == json.loads(line)["port"]
-        with serial.Serial(str(link), 115200, timeout=10) as port:
+        with serial.Serial(json.loads(line)["port"], 115200, timeout=10) as port:
             answer = b""
             while not answer:
                 port.write(b"$STATUS\n")
@@ -120,7 +114,6 @@ def test_help_ends_with_an_example_that_runs(firmware: None, tmp_path: Path) -> 
         process.stdin.close()  # which ends it
         process.stdout.close()
         assert process.wait(10) == 0
-    assert not link.is_symlink()
 
 
 def test_it_reports_that_it_was_late(firmware: None) -> None:
@@ -151,7 +144,6 @@ def test_it_reports_that_it_was_late(firmware: None) -> None:
         (["/dev/null"], "is not a firmware"),
         (["missing.elf"], "is not a firmware"),
         ([__file__], "is not a firmware"),
-        (["--link", "/nowhere/rig", str(ELF)], "no link"),
     ],
 )
 def test_mistakes_are_reported_in_one_sentence(firmware: None, words: list[str], sentence: str) -> None:
