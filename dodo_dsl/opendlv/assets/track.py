@@ -4,7 +4,6 @@ Metres and rad, world frame. Obstacles of an OpenDLV map are lines on the ground
 the vehicle's centre has to cross in order. A vehicle is a rectangle on the ground, which covers an area when it moves.
 """
 
-import difflib
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ from typing import Any, TypeVar
 import shapely
 
 from dodo_dsl.opendlv.assets import map_file
+from dodo_dsl.opendlv.assets.json_file import near
 
 TURN = math.radians(5)  # within a turn of this size a hull is as good as the area driven over
 
@@ -270,8 +270,7 @@ def pick(known: Mapping[str, Shape], names: Sequence[str], parameter: str, path:
     """Those obstacles that a parameter names, prepared for many queries; ValueError for an unknown name."""
     for name in names:
         if name not in known:
-            close = difflib.get_close_matches(name, known, n=1)
-            hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(sorted(known)) or 'none'}"
+            hint = near(name, known) or f"it has {', '.join(sorted(known)) or 'none'}"
             raise ValueError(f"--{parameter}: the map {path} has no obstacle {name!r}; {hint}")
         shapely.prepare(known[name])
     return {name: known[name] for name in names}

@@ -1,13 +1,12 @@
 """True boxes from a file in the COCO format (cocodataset.org, "Data format", object detection), in pixels."""
 
-import difflib
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 from msgspec import Meta, Struct
 
-from dodo_dsl.opendlv.assets.json_file import converted, load
+from dodo_dsl.opendlv.assets.json_file import converted, load, near
 from dodo_dsl.opendlv.assets.problem import InputError
 
 Frames = Literal["one", "sample-time", "number"]
@@ -74,9 +73,7 @@ def read(path: Path, frames: Frames) -> dict[int, list[tuple[str, Area]]]:
 
 def no_box(name: str, labels: Collection[str]) -> str:
     """What to say of a class that none of the boxes has; ``labels`` are theirs."""
-    close = difflib.get_close_matches(name, labels, n=1)
-    hint = f"did you mean '{close[0]}'?" if close else f"it has {', '.join(sorted(labels))}"
-    return f"no box of class '{name}'; {hint}"
+    return f"no box of class '{name}'; {near(name, labels) or 'it has ' + ', '.join(sorted(labels))}"
 
 
 def categories(path: Path) -> list[str]:
