@@ -96,7 +96,7 @@ def pyav(purpose: str) -> Any:
 
 FORMAT = "h264"
 _MICROSECOND = Fraction(1, 1_000_000)
-_ENCODED_AV_NAMES = {"argb": "bgr0", "bgr": "bgr24", "rgb": "rgb24", "i420": "yuv420p"}
+_LOSSLESS = {"argb": "bgr0", "bgr": "bgr24", "rgb": "rgb24", "i420": "yuv420p"}
 _PLANAR = "yuv420p"
 
 
@@ -125,7 +125,7 @@ class VideoEncoder:
             raise VideoError(f"h264 needs an even width and height, not {width} x {height}")
         self._av = pyav("encoded")
         self._kind, self._width, self._height = kind, width, height
-        self._pixels = _ENCODED_AV_NAMES[kind] if lossless else _PLANAR
+        self._pixels = _LOSSLESS[kind] if lossless else _PLANAR
         self._next = 0
         self._codec: Any = self._av.CodecContext.create("libx264" if self._pixels == _PLANAR else "libx264rgb", "w")
         self._codec.width, self._codec.height, self._codec.pix_fmt = width, height, self._pixels
@@ -141,19 +141,10 @@ class VideoEncoder:
 
     def encode(self, picture: NDArray[np.uint8]) -> bytes:
         """The packet of an image, shaped as ``pixels.view`` has it; raises VideoError."""
-        frame = self._frame(picture)
+        frame = self._av.VideoFrame.from_ndarray(picture, format=_AV_NAMES[self._kind]).reformat(format=self._pixels)
         frame.pts = self._next * 100_000
         self._next += 1
         try:
             return b"".join(bytes(packet) for packet in self._codec.encode(frame))
         except self._av.FFmpegError as error:
             raise VideoError(f"an image cannot be encoded: {error}") from None
-
-    def _frame(self, picture: NDArray[np.uint8]) -> Any:
-        if self._kind == "i420":
-            return self._av.VideoFrame.from_ndarray(picture, format=_PLANAR)
-        frame = self._av.VideoFrame(self._width, self._height, _ENCODED_AV_NAMES[self._kind])
-        plane = frame.planes[0]
-        rows = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)
-        rows[: self._height, : picture[0].nbytes] = picture.reshape(self._height, -1)
-        return frame.reformat(format=_PLANAR) if self._pixels == _PLANAR else frame
