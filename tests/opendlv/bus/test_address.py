@@ -1,13 +1,7 @@
 import subprocess
 import sys
 
-from dodo_dsl.opendlv.address import group
-
 LOADED = "import sys; import dodo_dsl.opendlv.address; print(*(m for m in sys.modules if m.startswith('dodo_dsl')))"
-
-
-def test_the_group_and_port_of_libcluon() -> None:
-    assert group(111) == ("225.0.0.111", 12175)
 
 
 def test_sandboxes_load_it_without_anything_else() -> None:

@@ -6,8 +6,6 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from dodo_dsl.opendlv import session as sessions
 from dodo_dsl.opendlv.address import group
@@ -68,24 +66,6 @@ def test_frames_are_those_of_libcluon_byte_for_byte(cid: int, peer: Peer) -> Non
             envelope = Envelope(id_, bytes.fromhex(payload), sent, 0, sampled, stamp)
             assert frame == encode_frame(envelope)
             assert decode_frame(frame) == envelope
-
-
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    st.integers(0, 2**31 - 1),
-    st.binary(max_size=300),
-    st.integers(0, 2**31 * 1_000_000 - 1),
-    st.integers(0, 2**32 - 1),
-)
-def test_any_envelope_passes_libcluon(cid: int, peer: Peer, id_: int, payload: bytes, time: int, stamp: int) -> None:
-    with Session(cid) as session:
-        session.send_envelope(Envelope(id_, payload, time, 0, time // 2, stamp))
-        heard = peer.answer()
-        assert heard["sent"] == time
-        peer.order("send", **{key: heard[key] for key in ("id", "payload", "sent", "sampled", "stamp")})
-        envelope = session.receive(10.0)
-        assert envelope is not None
-        assert envelope._replace(received=0) == Envelope(id_, payload, time, 0, time // 2, stamp)
 
 
 def test_own_messages_are_dropped_and_others_kept_in_order(cid: int) -> None:
@@ -177,22 +157,6 @@ def test_nobody_has_a_session_s_port_at_another_local_address(cid: int) -> None:
         other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         with pytest.raises(OSError, match="Address already in use"):
             other.bind(("127.0.0.2", session.port))
-
-
-def test_a_session_knows_the_address_that_others_see(cid: int) -> None:
-    with Session(cid) as session, Session(cid) as other:
-        session.send(STEERING())
-        assert other.receive(5.0) is not None
-        assert other.source == session.address
-
-
-def test_without_the_kernel_s_time_a_datagram_came_now(cid: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sessions, "_set_if_known", lambda *_: None)
-    before = time.time_ns() // 1000
-    with Session(cid) as one, Session(cid) as two:
-        one.send(one.messages.type("opendlv.proxy.PedalPositionRequest")(position=0.5))
-        envelope = two.receive(5)
-    assert envelope and before <= envelope.received <= time.time_ns() // 1000 and two.lost == 0
 
 
 @pytest.mark.thorough

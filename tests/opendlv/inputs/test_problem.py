@@ -36,9 +36,3 @@ def test_a_problem_has_its_place_in_the_file(tmp_path: Path) -> None:
     assert InputError(file, "wrong", "d[1]").position() == (3, 12)
     assert InputError(file, "wrong", line=2, column=3).position() == (2, 3)
     assert InputError(file, "wrong").position() == InputError(tmp_path / "gone", "wrong", "d").position() == (1, 1)
-
-
-def test_a_problem_is_one_sentence() -> None:
-    file = Path("map.json")
-    assert str(InputError(file, "wrong", "$.d")) == "map.json: $.d: wrong"
-    assert str(InputError(file, "wrong", line=2, column=3)) == "map.json:2:3: wrong"

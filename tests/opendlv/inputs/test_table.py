@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.assets.table import read_target
-from dodo_dsl.opendlv.assets.trajectory import Trajectory, TrajectoryError, read_points, read_table
-from tests.services.process import ROOT
+from dodo_dsl.opendlv.assets.trajectory import TrajectoryError, read_points, read_table
 
 READERS: list[Callable[[Path], Any]] = [lambda path: read_table(path, 0.0), lambda path: read_target(path, "x")]
 
@@ -30,13 +29,6 @@ def test_way_points_have_their_columns_in_any_order(tmp_path: Path) -> None:
     assert second.place == f"{path}:5"
     (point, _) = read_table(table(tmp_path, "x,y,z\n1,2,3\n2,2,3\n"), height=9)
     assert (point.z, point.yaw, point.time) == (3, None, None)
-
-
-def test_the_tables_of_the_registry_are_ways() -> None:
-    paths = sorted((ROOT / "tests_registry" / "targets").glob("*.csv"))
-    assert paths
-    for path in paths:
-        assert Trajectory(read_table(path, height=0), speed=1).duration > 1
 
 
 @pytest.mark.parametrize(

@@ -57,11 +57,6 @@ def test_an_unknown_key_is_told_where_it_is(
     assert [(e.is_slip, e.position()[0]) for e in told(name, document) if "'zzq'" in e.what] == [(True, line)]
 
 
-@pytest.mark.parametrize("name", ["map", "obstacles"])
-def test_keys_of_the_format_are_not_told(told: Callable[[str, Any], list[InputError]], name: str) -> None:
-    assert told(name, MAP) == []
-
-
 def test_a_key_of_many_objects_is_told_once(told: Callable[[str, Any], list[InputError]]) -> None:
     (found,) = told("map", {**MAP, "obstacles": [{**MAP["obstacles"][0], "lnes": 1, "name": name} for name in "abc"]})
     assert found.what == "$.obstacles[0].lnes: nothing reads 'lnes'"

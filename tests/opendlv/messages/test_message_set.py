@@ -12,7 +12,6 @@ from dodo_dsl.opendlv.odvd import OdvdError
 from tests.opendlv import vectors
 
 STANDARD = MessageSet.standard()
-BOX = "opendlv.logic.perception.DetectionBoundingBox"
 
 
 @pytest.fixture
@@ -49,17 +48,6 @@ def test_every_field_is_written(name: str, fields: dict[str, Any], payload: str)
     message = STANDARD.type(name)(**fields)
     assert STANDARD.encode(message).hex() == payload
     assert STANDARD.decode(STANDARD.id(name), bytes.fromhex(payload)).ListFields()
-
-
-@given(
-    st.fixed_dictionaries(
-        dict.fromkeys(("sampleId", "detectionId"), st.integers(0, 2**32 - 1))
-        | dict.fromkeys(("x", "y", "width", "height"), st.floats(width=32, allow_nan=False))
-    )
-)
-def test_round_trip(fields: dict[str, Any]) -> None:
-    decoded = STANDARD.decode(1134, STANDARD.encode(STANDARD.type(BOX)(**fields)))
-    assert {field.name: value for field, value in decoded.ListFields()} == fields
 
 
 @given(st.sampled_from(STANDARD.names()), st.binary(max_size=60))

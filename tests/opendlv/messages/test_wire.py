@@ -1,62 +1,14 @@
 """Fields on protobuf's wire: split and made unique without their message class."""
 
 import pytest
-from google.protobuf.internal import encoder
-from hypothesis import given
-from hypothesis import strategies as st
 
 from dodo_dsl.opendlv import wire
-from dodo_dsl.opendlv.wire import DELIMITED, EIGHT_BYTES, FOUR_BYTES, VARINT
-
-NUMBERS = st.integers(0, 2**64 - 1)
+from dodo_dsl.opendlv.wire import DELIMITED, VARINT
 
 
 def field(number: int, wire_type: int, body: bytes) -> bytes:
     length = wire.varint(len(body)) if wire_type == DELIMITED else b""
     return wire.varint(number << 3 | wire_type) + length + body
-
-
-FIELDS = st.tuples(st.integers(1, 2**29 - 1), st.sampled_from((VARINT, EIGHT_BYTES, DELIMITED, FOUR_BYTES))).flatmap(
-    lambda key: st.tuples(
-        st.just(key[0]),
-        st.just(key[1]),
-        {
-            VARINT: NUMBERS.map(wire.varint),
-            EIGHT_BYTES: st.binary(min_size=8, max_size=8),
-            FOUR_BYTES: st.binary(min_size=4, max_size=4),
-            DELIMITED: st.binary(max_size=300),
-        }[key[1]],
-    )
-)
-
-
-@given(NUMBERS, st.binary(max_size=9), st.binary(max_size=9))
-def test_numbers_are_those_of_protobuf(value: int, before: bytes, behind: bytes) -> None:
-    written: list[bytes] = []
-    encoder._VarintEncoder()(written.append, value, False)
-    assert wire.varint(value) == b"".join(written)
-    assert wire.read_varint(before + wire.varint(value) + behind, len(before)) == (
-        value,
-        len(before) + len(wire.varint(value)),
-    )
-
-
-@given(st.lists(FIELDS, max_size=9))
-@pytest.mark.thorough
-def test_fields_are_split_where_they_begin(fields: list[tuple[int, int, bytes]]) -> None:
-    data = b"".join(field(*each) for each in fields)
-    found = list(wire.chunks(data))
-    assert [(chunk.number, chunk.wire_type, chunk.body) for chunk in found] == fields
-    assert b"".join(chunk.head + chunk.body for chunk in found) == data
-
-
-@given(st.binary(max_size=60))
-def test_any_bytes_are_fields_or_an_error(data: bytes) -> None:
-    try:
-        found = list(wire.chunks(data))
-    except wire.WireError:
-        return
-    assert b"".join(chunk.head + chunk.body for chunk in found) == data
 
 
 @pytest.mark.parametrize(

@@ -20,14 +20,6 @@ def test_frames_are_there_before_the_end(tmp_path: Path) -> None:
         assert (writer.frames, writer.size) == (10, path.stat().st_size)
 
 
-def test_what_is_there_is_kept(tmp_path: Path) -> None:
-    path = tmp_path / "old.rec"
-    path.write_bytes(b"dear")
-    with pytest.raises(FileExistsError):
-        RecordingWriter(path)
-    assert path.read_bytes() == b"dear"
-
-
 def test_an_envelope_that_fits_in_no_frame_is_not_written(tmp_path: Path) -> None:
     with RecordingWriter(tmp_path / "new.rec") as writer:
         with pytest.raises(FrameError):

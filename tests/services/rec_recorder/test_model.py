@@ -10,11 +10,6 @@ from dodo_dsl.opendlv.recording import read_envelopes
 from services.rec_recorder.model import RecordingFile, RecordingFileError
 
 
-def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(RecordingFileError, match=r"drive\.rec cannot be written: No such file or directory"):
-        RecordingFile(tmp_path / "nowhere" / "drive.rec")
-
-
 def envelope(number: int) -> Envelope:
     return Envelope(1090, bytes(100), number, number, number, 0)
 

@@ -18,7 +18,7 @@ from dodo_dsl.opendlv.video import VideoDecoder, VideoEncoder
 from services.rec_recorder import service
 from services.rec_recorder.service import Recorder
 from services.rec_recorder.source import SourceError
-from tests.services.built import MESSAGES, built, refusal
+from tests.services.built import MESSAGES, built
 
 WIDTH, HEIGHT, COUNT = 160, 120, 8
 T0, PERIOD = 1_700_000_000_000_000, 50_000
@@ -78,25 +78,6 @@ def staged(path: Path, kind: str, *flags: str, width: int = WIDTH) -> Iterator[S
     memories = f"--memories={camera.name}:{width}x{HEIGHT}"
     with camera.memory, built("rec_recorder", f"--rec={path}", "--frames=20", memories, *flags) as recorder:
         yield Stage(recorder, camera)
-
-
-def record(folder: Path, kind: str, *flags: str) -> Path:
-    path = folder / "drive.rec"
-    with staged(path, kind, *flags) as stage:
-        for number in range(COUNT):
-            stage.hear("opendlv.proxy.PedalPositionRequest", T0 + number * PERIOD + 1, position=number)
-            stage.show(number)
-    assert recorded(path) == list(range(COUNT))
-    return path
-
-
-@pytest.mark.parametrize("kind", ["i420", "argb", "bgr"])
-def test_lossless_pictures_are_decoded_bit_for_bit(tmp_path: Path, kind: str) -> None:
-    decoder = VideoDecoder("h264")
-    envelopes = [e for e in read_envelopes(record(tmp_path, kind, "--lossless")) if e.data_type == IMAGE]
-    for number, envelope in enumerate(envelopes):
-        frame = decoder.decode(MESSAGES.decode(IMAGE, envelope.payload).data)
-        assert frame is not None and np.array_equal(frame.pixels(kind), scene(number, kind))
 
 
 def test_pictures_alone_are_in_a_recording_of_their_own(tmp_path: Path) -> None:
@@ -162,8 +143,3 @@ def test_what_cannot_be_encoded_ends_only_the_pictures_that_decide_nothing(
     ]
     with staged(tmp_path / "two.rec", "i420", width=162) as stage, pytest.raises(SourceError):
         stage.show(0)
-
-
-def test_a_recording_of_pictures_needs_their_rate(tmp_path: Path) -> None:
-    said = refusal("rec_recorder", f"--rec={tmp_path / 'drive.rec'}", f"--pictures={tmp_path / 'frames.rec'}")
-    assert said == "--pictures needs --frames: the rate of the pictures"

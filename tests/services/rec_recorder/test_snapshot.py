@@ -9,7 +9,7 @@ from dodo_dsl.opendlv import pixels
 from dodo_dsl.opendlv.recording import read_envelopes
 from services.rec_recorder.pictures import Snapshot
 from services.rec_recorder.source import MemorySpec, PictureSource
-from tests.services.built import built, refusal
+from tests.services.built import built
 from tests.services.rec_recorder.test_pictures import HEIGHT, WIDTH, CameraMemory, scene
 
 
@@ -26,20 +26,6 @@ def taken(path: Path) -> list[int]:
         return []
     found = cv2.imread(str(path))
     return [n for n in range(9) if np.array_equal(found, pixels.converted(scene(n, "argb"), "argb", "bgr"))]
-
-
-def test_the_first_picture_from_the_begin_on(camera: CameraMemory, tmp_path: Path) -> None:
-    path, seen = tmp_path / "snapshot.png", []
-    snapshot = Snapshot(PictureSource(MemorySpec(camera.name, WIDTH, HEIGHT), 1), path)
-    for number in range(6):
-        snapshot.update(number)
-        seen.append(taken(path))
-        if number == 3:
-            snapshot.begin()
-        camera.show(number)
-    assert seen == [[], [], [], [], [3], [3]]
-    assert [entry.name for entry in tmp_path.iterdir()] == ["snapshot.png"]
-    snapshot.close()
 
 
 @pytest.mark.parametrize(
@@ -71,8 +57,3 @@ def test_the_recorder_takes_one_without_recording_frames(camera: CameraMemory, t
         recorder.update(3)
     assert taken(path) == [2]
     assert [envelope.data_type for envelope in read_envelopes(tmp_path / "drive.rec")] == [2906]
-
-
-def test_a_snapshot_needs_a_memory(tmp_path: Path) -> None:
-    flags = (f"--rec={tmp_path / 'drive.rec'}", "--snapshot=x.png")
-    assert refusal("rec_recorder", *flags).startswith("--snapshot needs --memories")

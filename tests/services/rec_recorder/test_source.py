@@ -1,4 +1,3 @@
-import logging
 import os
 from collections.abc import Iterator
 
@@ -87,15 +86,6 @@ def test_layouts(text: str, size: int, layout: tuple[str, int, int]) -> None:
     assert parse(text).layout(size) == layout
 
 
-def test_an_assumption_is_said_once_a_memory(caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.INFO):
-        for _ in range(3):
-            for name in ("once0.i420", "once1.i420"):
-                parse(name).layout(640 * 480 * 3 // 2)
-    assumed = "assuming that memory 'once{}.i420' has 640 x 480 pixels of i420"
-    assert caplog.messages == [assumed.format(0), assumed.format(1)]
-
-
 @pytest.mark.parametrize(
     ("text", "size", "problem"),
     [
@@ -113,12 +103,3 @@ def test_memories_without_pictures(text: str, size: int, problem: str) -> None:
 def test_memories_written_wrongly(text: str) -> None:
     with pytest.raises(SourceError, match="is not a memory to record, expected a name such as"):
         parse(text)
-
-
-def test_a_camera_that_keeps_the_lock_is_waited_for(memory: SharedMemory) -> None:
-    source = PictureSource(MemorySpec(memory.name), PERIOD)
-    assert source.take(0) is None
-    with SharedMemory.attach(memory.name) as other, other.lock():
-        assert source.take(0) is None
-    assert taken(source, memory, [PERIOD]) == [PERIOD // 1000]
-    source.close()

@@ -55,10 +55,6 @@ def test_all_in_the_order_of_sample_times_with_gaps_cut(recording: Recording) ->
     ]
 
 
-def test_faster(recording: Recording) -> None:
-    assert [due for _, due, _ in chosen(recording, {}, 10.0)] == [0.0, 0.05, 0.1, 0.2, 0.3]
-
-
 @pytest.mark.parametrize(
     ("selection", "rows"),
     [

@@ -97,10 +97,11 @@ def test_sample_times_of_the_test(tmp_path: Path) -> None:
 
 
 def test_it_repeats(tmp_path: Path) -> None:
-    rec = write(tmp_path / "drive.rec", pedals([0, 0.01, 0.02]))
-    with staged(rec, "--autorewind", "--await-begin=false") as stage:
-        stage.run(0.2)
-    assert stage.positions[:12] == [0, 1, 2] * 4 and not stage.service.finished
+    for number, times in enumerate(([0, 0.01, 0.02], [0])):  # also a part without duration
+        rec = write(tmp_path / f"{number}.rec", pedals(times))
+        with staged(rec, "--autorewind", "--await-begin=false") as stage:
+            stage.run(0.2)
+        assert stage.positions[:12] == [*range(len(times))] * (12 // len(times)) and not stage.service.finished
 
 
 def test_recordings_that_cannot_be_played(tmp_path: Path) -> None:
