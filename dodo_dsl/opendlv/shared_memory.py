@@ -115,7 +115,6 @@ class SharedMemory:
             return segment.wait(timeout)
 
     def readers_waiting(self) -> int:
-        """How many processes wait for a notification at this moment."""
         with self._used() as segment:
             return segment.readers_waiting()
 

@@ -67,12 +67,10 @@ def zigzag(value: int) -> int:
 
 
 def unzigzag(value: int) -> int:
-    """The number with a sign."""
     return value >> 1 ^ -(value & 1)
 
 
 def varint(value: int) -> bytes:
-    """Encode a number that is not negative."""
     out = bytearray()
     while value > 0x7F:
         out.append(value & 0x7F | 0x80)

@@ -130,7 +130,6 @@ class RecordingFile:
             raise RecordingFileError(f"{place}: {error.strerror}") from None
 
     def close(self) -> None:
-        """End the recording."""
         self._writer.close()
 
 
@@ -151,7 +150,6 @@ class NewestPictures:
         self._writer = _new(path)
 
     def write(self, envelope: Envelope) -> None:
-        """Append a picture; oldest ones may go."""
         if not self.is_on:
             return
         try:
@@ -166,7 +164,6 @@ class NewestPictures:
         return self.is_on and self._path.exists()
 
     def close(self) -> None:
-        """End the recording."""
         self._writer.close()
 
     def _append(self, frame: bytes) -> None:

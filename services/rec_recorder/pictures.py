@@ -77,7 +77,6 @@ class RecordedCamera:
         )
 
     def close(self) -> None:
-        """Detach from the memory."""
         self._source.close()
 
 
@@ -108,7 +107,6 @@ class Later:
             self._encode()
 
     def close(self) -> None:
-        """Encode what is left, if it is wanted."""
         try:
             while self._waiting and self._is_wanted():
                 self._encode()
@@ -135,7 +133,6 @@ class Snapshot:
         self._has_begun = True
 
     def update(self, now: int) -> None:
-        """Take what is there at `now`, microseconds."""
         taken = None if self._is_taken else self._source.take(now)
         if taken is None or not self._has_begun:
             return
@@ -149,5 +146,4 @@ class Snapshot:
             _log.warning("no snapshot was taken: %s", error)
 
     def close(self) -> None:
-        """Detach from the memory."""
         self._source.close()

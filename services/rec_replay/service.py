@@ -10,7 +10,6 @@ import numpy as np
 from google.protobuf.message import Message
 
 from dodo_dsl.opendlv import message_versions, pixels
-from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.envelope import MICROSECONDS
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import Recording
@@ -123,7 +122,6 @@ class Replay(Service):
         return self._player.when(int(self._pictures[0 if is_over else number]), in_next_round=is_over)
 
     def close(self) -> None:
-        """Log what could not be played."""
         if self._too_large:
             _log.warning("%d messages were not sent: they are too large for the bus", self._too_large)
 
@@ -198,8 +196,11 @@ def _memories(context: Context, recording: Recording, part: Part) -> Memories:
     if not flags["video"]:
         return ()
     if not part.shown.any():
-        _refuse_other_senders(recording, flags["video-sender"])
-        _log.warning("%s has no pictures in the selected part: no shared memory is created", recording.path)
+        _log.warning(
+            "%s has no pictures of sender %d in the selected part: no memory is created",
+            recording.path,
+            flags["video-sender"],
+        )
         return ()
     frame = first_frame(recording, part.rows[part.shown])
     width, height = frame.width, frame.height
@@ -208,13 +209,3 @@ def _memories(context: Context, recording: Recording, part: Part) -> Memories:
         _log.warning("pictures of %d x %d pixels cannot be converted to I420", width, height)
         formats = tuple(kind for kind in formats if kind != "i420")
     return memories(context, width, height, formats)
-
-
-def _refuse_other_senders(recording: Recording, sender: int) -> None:
-    index = recording.index
-    senders = np.unique(index["sender_stamp"][index["data_type"] == IMAGE]).tolist()
-    if senders and sender not in senders:
-        others = ", ".join(map(str, senders))
-        raise SelectionError(
-            f"{recording.path} has no pictures of sender {sender}, but of {others}: set --video-sender"
-        )

@@ -53,7 +53,6 @@ class EntryStream:
         self.rewind()
 
     def rewind(self) -> None:
-        """Begin with the first entry."""
         self.decoder = FrameDecoder()
         self._entries = self._all()
         self._ahead: Entry | None = None
