@@ -31,7 +31,7 @@ from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, rate_row, 
 from benchmarks.pictures.gl_peer import GlPeer, ssim
 from dodo_dsl import package_data
 from services.scene.camera import CameraMotion, CameraPose, Pinhole, still
-from services.scene.lens import Distortion
+from services.scene.lens import Distortion, Lens
 from services.scene.raster import Image
 from services.scene.render import Renderer
 from services.scene.scene import SceneOptions, load_scene
@@ -194,7 +194,7 @@ CONDITIONS: dict[str, tuple[SceneOptions, dict[str, object]]] = {
     "exposure": (SceneOptions(), {"sensor": Sensor(exposure=0.4)}),
     "noise": (SceneOptions(), {"sensor": Sensor(noise=0.03)}),
     "shutter 20 ms": (SceneOptions(), {"shutter": 0.02}),
-    "distortion": (SceneOptions(), {"distortion": Distortion(-0.25, 0.05)}),
+    "distortion": (SceneOptions(), {"lens": Lens(Pinhole(*SIZE, FOVY), Distortion(-0.25, 0.05))}),
     "boxes": (SceneOptions(), {}),
 }
 

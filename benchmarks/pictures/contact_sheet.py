@@ -10,7 +10,7 @@ import numpy as np
 
 from dodo_dsl import package_data
 from services.scene.camera import CameraMotion, CameraPose, Pinhole
-from services.scene.lens import Distortion
+from services.scene.lens import Distortion, Lens
 from services.scene.raster import Image
 from services.scene.render import Renderer
 from services.scene.scene import SceneOptions, load_scene
@@ -30,7 +30,10 @@ SHEET: dict[str, tuple[SceneOptions, dict[str, object]]] = {
     "exposure=0.15": (SceneOptions(), {"sensor": Sensor(exposure=0.15)}),
     "noise=0.06": (SceneOptions(), {"sensor": Sensor(noise=0.06)}),
     "shutter=40ms": (SceneOptions(), {"shutter": 0.04}),
-    "k1=-0.4 k2=0.1, lines": (SceneOptions(lines=("left", "right")), {"distortion": Distortion(-0.4, 0.1)}),
+    "k1=-0.4 k2=0.1, lines": (
+        SceneOptions(lines=("left", "right")),
+        {"lens": Lens(Pinhole(*SIZE, FOVY), Distortion(-0.4, 0.1))},
+    ),
     "low light, boxes": (SceneOptions(light=Light.of_flags(-60, 20, 0.3)), {}),
 }
 

@@ -1,8 +1,12 @@
 """The attitude of bodies in ``opendlv.sim.Frame``, a quaternion from the body to the world."""
 
 import math
+from typing import Any
 
 Quaternion = tuple[float, float, float, float]
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+"""Three rows."""
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
@@ -16,6 +20,30 @@ def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
         cr * cp * sy - sr * sp * cy,
         cr * cp * cy + sr * sp * sy,
     )
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> Matrix:
+    """The matrix of the same angles, from the body to the world."""
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+
+
+def rotation_of(x: Any, y: Any, z: Any, w: Any) -> Any:
+    """The matrix of a quaternion of length one, from the body to the world; of arrays, one of arrays."""
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+    )
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """The vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def heading_of(qx: float, qy: float, qz: float, qw: float) -> float | None:

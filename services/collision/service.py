@@ -1,7 +1,7 @@
 """The evaluator of a closed loop on the bus."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,18 +25,17 @@ class Collision(TrackEvaluator):
     def __init__(self, context: Context, wall: Callable[[], float] = time.monotonic) -> None:
         """``wall`` in s: on a rig it is an error when the vehicle vanishes."""
         flags = context.flags
-        requests = [_port(text, context) for text in flags["requests"]]
-        labels = [_label(name, stamp, requests) for name, stamp in requests]
+        requests = {text: _port(text, context) for text in flags["requests"]}
         box = VehicleBox(flags["length"], flags["width"])
         bodies = _bodies(flags)
-        super().__init__(track(flags), box, Requests(list(dict.fromkeys(labels)), flags["max-silence"]), bodies)
+        super().__init__(track(flags), box, Requests(tuple(requests), flags["max-silence"]), bodies)
         self._on_rig, self._wall = context.on_rig, wall
         self._seen: float | None = None
         self._gap: float | None = None
         self.inputs = {(FRAME, stamp): partial(self._take_body, stamp) for stamp in bodies}
         self.inputs[FRAME, flags["frame-id"]] = self._take_frame
-        for label, (name, stamp) in zip(labels, requests, strict=True):
-            self.inputs[name, stamp] = self._request(label)
+        for text, (name, stamp) in requests.items():
+            self.inputs[name, stamp] = self._request(text)
             self.judged.message(name, stamp)
         roles = {**dict.fromkeys(self.track.walls, "wall"), **dict.fromkeys(flags["gates"], "gate")}
         roles |= {flags["goal"]: "goal"} if flags["goal"] else {}
@@ -52,8 +51,8 @@ class Collision(TrackEvaluator):
         if self._gap is not None and silent > max(SILENCE, GAPS * self._gap):
             raise UnjudgeableError(f"no Frame of the vehicle has come for {silent:.0f} s, and they came before")
 
-    def _request(self, label: str) -> Handler:
-        return lambda _message, _sample_time: self.request(label)
+    def _request(self, text: str) -> Handler:
+        return lambda _message, _sample_time: self.request(text)
 
     def _take_frame(self, frame: Any, sample_time: int) -> None:
         now = self._wall()
@@ -83,12 +82,6 @@ def _bodies(flags: Flags) -> Footprints:
     if not found:
         raise ValueError(f"--bodies: {NO_BODIES}")
     return found
-
-
-def _label(name: str, stamp: int | None, requests: Sequence[tuple[str, int | None]]) -> str:
-    """How a request is called: with its sender stamp where others have the same name."""
-    is_one = sum(other == name for other, _ in requests) == 1
-    return name if is_one or stamp is None else f"{name}/{stamp}"
 
 
 build = Collision

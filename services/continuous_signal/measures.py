@@ -154,8 +154,8 @@ class SignalLimits:
             raise ValueError(f"--until={flags['until']:g} is not after --from={flags['from']:g}")
         self.flags, self.exact = flags, exact
         self.band: float | None = band.of_one if isinstance(band, Share) else band
-        times = (round(flags[name] * MICROSECONDS) for name in ("from", "hold", "start-up", "max-delay"))
-        self.start, self.hold, self.start_up, self.delay = times
+        names = ("from", "hold", "start-up", "max-delay")
+        self.start, self.hold, self.start_up, self.delay = (int(round(flags[name] * MICROSECONDS)) for name in names)
         self.until = None if flags["until"] is None else round(flags["until"] * MICROSECONDS)
 
     def __getitem__(self, name: str) -> float | None:

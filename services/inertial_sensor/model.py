@@ -6,10 +6,8 @@ SI units. Body: x forward, y left, z up; world: z up. Vectors are tuples, and ro
 import math
 from dataclasses import dataclass
 
+from dodo_dsl.opendlv.attitude import Matrix, Vector, cross, rotation_of
 from dodo_dsl.opendlv.envelope import MICROSECONDS
-
-Vector = tuple[float, float, float]
-Matrix = tuple[Vector, Vector, Vector]
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 UPRIGHT: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -32,22 +30,8 @@ def attitude(qx: float, qy: float, qz: float, qw: float) -> Matrix | None:
     length = math.hypot(qx, qy, qz, qw)
     if not math.isfinite(length) or length == 0.0:
         return None
-    x, y, z, w = (each / length for each in (qx, qy, qz, qw))
-    return (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-
-
-def mounted(roll: float, pitch: float, yaw: float) -> Matrix:
-    """The rotation from the sensor to the body, from angles in rad: yaw, then pitch, then roll about the new axes."""
-    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
-    return (
-        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-        (-sp, cp * sr, cp * cr),
-    )
+    matrix: Matrix = rotation_of(*(each / length for each in (qx, qy, qz, qw)))
+    return matrix
 
 
 def plus(*vectors: Vector) -> Vector:
@@ -59,11 +43,6 @@ def plus(*vectors: Vector) -> Vector:
 def times(factor: float, v: Vector) -> Vector:
     """The vector, so many times as long."""
     return factor * v[0], factor * v[1], factor * v[2]
-
-
-def cross(a: Vector, b: Vector) -> Vector:
-    """The vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @dataclass(frozen=True)

@@ -5,17 +5,9 @@ import random
 from collections.abc import Iterator
 from typing import Any
 
+from dodo_dsl.opendlv.attitude import Matrix, Vector, rotation
 from services.base import Context, Output, Service, UnusableMessageError, period_of
-from services.inertial_sensor.model import (
-    BodyState,
-    InertialModel,
-    Matrix,
-    Origin,
-    Vector,
-    attitude,
-    magnetic_field,
-    mounted,
-)
+from services.inertial_sensor.model import BodyState, InertialModel, Origin, attitude, magnetic_field
 
 _ANGULAR, _ACCELERATION = "opendlv.proxy.AngularVelocityReading", "opendlv.proxy.AccelerationReading"
 _MAGNETIC, _PLACE = "opendlv.proxy.MagneticFieldReading", "opendlv.logic.sensation.Geolocation"
@@ -29,7 +21,7 @@ class InertialSensor(Service):
         self._flags = flags
         self._type = context.messages.type
         self.period = period_of(flags["freq"])
-        mount = mounted(*(math.radians(flags[name]) for name in ("roll", "pitch", "yaw")))
+        mount = rotation(*(math.radians(flags[name]) for name in ("roll", "pitch", "yaw")))
         self._model = InertialModel((flags["x"], flags["y"], flags["z"]), mount, flags["gravity"])
         self._sent = [flags[name] for name in ("angular-velocity", "acceleration", "magnetic-field")]
         north = math.radians(flags["north"])

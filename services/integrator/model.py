@@ -6,10 +6,8 @@ Rotations are unit quaternions (x, y, z, w); the motion of a body of constant ve
 import math
 from dataclasses import dataclass
 
-from dodo_dsl.opendlv.attitude import Quaternion, heading_of
+from dodo_dsl.opendlv.attitude import Quaternion, Vector, cross, heading_of
 from dodo_dsl.opendlv.envelope import MICROSECONDS
-
-Vector = tuple[float, float, float]
 
 SERIES = 0.05  # rad; below it the series is more exact than the quotient
 UPRIGHT = 1 - 1e-12  # sine of a pitch at which roll and yaw cannot be distinguished
@@ -65,10 +63,6 @@ def displacement(velocity: Vector, rates: Vector, dt: float) -> Vector:
     once = cross(phi, velocity)
     bent = _sum(velocity, (_half(angle), once), (_sixth(angle), cross(phi, once)))
     return dt * bent[0], dt * bent[1], dt * bent[2]
-
-
-def cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def _sinc(angle: float) -> float:

@@ -13,7 +13,7 @@ from dodo_dsl.opendlv.envelope import MICROSECONDS
 from services.base import Context, Flags, Output, Service
 from services.projected_truth.path import FollowedMemory, MeasuredPath
 from services.scene.camera import CameraPose, body_pose, mount
-from services.scene.lens import Lens, camera_of, lens_of
+from services.scene.lens import Lens, camera_of
 from services.scene.render import Renderer
 from services.scene.scene import SceneOptions, load_scene
 from services.scene.truth import TruthSender, truth_sender
@@ -110,8 +110,7 @@ def build(context: Context) -> Service:
 
 
 def _open(flags: Flags) -> tuple[Renderer, Lens | None]:
-    camera, distortion, alignment = camera_of(flags)
-    lens = lens_of(camera, distortion, alignment)
+    camera, lens = camera_of(flags)
     wide = lens.wide if lens else camera
     scene = load_scene(Path(flags["map-path"]), SceneOptions(own=flags["frame-id"]))
     return Renderer(scene, wide.width, wide.height, wide.fovy), lens

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from dodo_dsl.opendlv.attitude import rotation, rotation_of
 from services.base import UnusableMessageError
 
 Array = npt.NDArray[np.float64]
@@ -22,31 +23,12 @@ NEAR = 0.01
 """Nothing closer to the camera than this is drawn, in m along the optical axis."""
 
 
-def euler_rotation(roll: float, pitch: float, yaw: float) -> Array:
-    """The right-handed rotation Rz(yaw) Ry(pitch) Rx(roll), body to parent, angles in rad."""
-    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
-
-
 def quaternion_rotation(x: float, y: float, z: float, w: float) -> Array:
     """The rotation of a quaternion of any length; UnusableMessageError when it has none or is not finite."""
     length = math.sqrt(x * x + y * y + z * z + w * w)
     if not math.isfinite(length) or length < 1e-6:
         raise UnusableMessageError(f"quaternion ({x}, {y}, {z}, {w}) is not a rotation")
-    x, y, z, w = x / length, y / length, z / length, w / length
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return np.array(rotation_of(x / length, y / length, z / length, w / length))
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +41,7 @@ class CameraPose:
     @classmethod
     def at(cls, x: float, y: float, z: float, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Self:
         """From a position in m and right-handed angles in rad (a positive pitch looks down)."""
-        return cls(np.array([x, y, z], dtype=np.float64), euler_rotation(roll, pitch, yaw))
+        return cls(np.array([x, y, z], dtype=np.float64), np.array(rotation(roll, pitch, yaw)))
 
     def carrying(self, mounted: "CameraPose") -> "CameraPose":
         """The pose, in this pose's parent frame, of something mounted on this body."""

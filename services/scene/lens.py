@@ -6,7 +6,7 @@ Brown and Conrady, as OpenCV has it. That is at u = fx x + cx and v = fy y + cy 
 """
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -28,9 +28,6 @@ class Distortion:
     k2: float = 0.0
     p1: float = 0.0
     p2: float = 0.0
-
-    def __bool__(self) -> bool:
-        return any(astuple(self))
 
     def shifted(self, ideal: Array) -> tuple[Array, Array]:
         """The radial factor (...,) and the tangential offset (..., 2) for points (..., 2) at depth 1."""
@@ -79,25 +76,22 @@ class Alignment:
         return focal, np.array([middle if value is None else value for value, middle in written])
 
 
-def camera_of(flags: Flags) -> tuple[Pinhole, Distortion, Alignment]:
-    """The ideal camera, what its lens distorts, and where its chip is, by a service's flags."""
+def camera_of(flags: Flags) -> "tuple[Pinhole, Lens | None]":
+    """The camera by a service's flags, and its lens if it is not ideal; raises ValueError as Lens does."""
     camera = Pinhole(flags["width"], flags["height"], math.radians(flags["fovy"]))
     distortion = Distortion(*(flags[f"distortion.{name}"] for name in ("k1", "k2", "p1", "p2")))
-    return camera, distortion, Alignment(*(flags[name] for name in ("focal-x", "centre-x", "centre-y")))
-
-
-def lens_of(camera: Pinhole, distortion: Distortion, alignment: Alignment) -> "Lens | None":
-    """None if the camera is ideal; raises ValueError as Lens does."""
-    return Lens(camera, distortion, alignment) if distortion or alignment != Alignment() else None
+    alignment = Alignment(*(flags[name] for name in ("focal-x", "centre-x", "centre-y")))
+    is_ideal = distortion == Distortion() and alignment == Alignment()
+    return camera, None if is_ideal else Lens(camera, distortion, alignment)
 
 
 class Lens:
     """Turns pictures of a larger ideal camera, ``wide``, into what ``camera`` sees through a lens."""
 
-    def __init__(self, camera: Pinhole, distortion: Distortion, alignment: Alignment | None = None) -> None:
+    def __init__(self, camera: Pinhole, distortion: Distortion, alignment: Alignment = Alignment()) -> None:
         """ValueError when the coefficients fold the picture or need far more than it shows."""
         self.camera, self._distortion = camera, distortion
-        self._focal, self._centre = (alignment or Alignment()).of(camera)
+        self._focal, self._centre = alignment.of(camera)
         v, u = np.mgrid[0 : camera.height, 0 : camera.width].astype(np.float64)
         shown = (np.stack([u, v], axis=-1) - self._centre) / self._focal
         ideal = distortion.backward(shown)

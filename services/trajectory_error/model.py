@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dodo_dsl.opendlv.attitude import rotation_of
+
 Times = NDArray[np.int64]
 Values = NDArray[np.float64]
 _LINE = 1e-10
@@ -30,12 +32,7 @@ class Poses(NamedTuple):
 def poses(rows: Values) -> Poses:
     """The poses of rows of x, y, z, qx, qy, qz and qw; a quaternion may have any length but none."""
     x, y, z, w = (rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)).T
-    matrix = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return Poses(rows[:, :3], np.moveaxis(np.array(matrix), 2, 0))
+    return Poses(rows[:, :3], np.moveaxis(np.array(rotation_of(x, y, z, w)), 2, 0))
 
 
 def nearest(known: Times, times: Times, most: int) -> Times:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from dodo_dsl.opendlv.assets.map_file import OverlayEntry
 from services.scene.camera import CameraMotion, CameraPose, Pinhole
-from services.scene.lens import Alignment, Distortion, lens_of
+from services.scene.lens import Lens
 from services.scene.raster import Image
 from services.scene.render import Renderer
 from services.scene.textures import load_picture
@@ -122,16 +122,14 @@ class Optics:
     def __init__(
         self,
         camera: Pinhole,
-        distortion: Distortion | None = None,
+        lens: Lens | None = None,
         sensor: Sensor | None = None,
         overlays: Sequence[Overlay] = (),
         shutter: float = 0.0,
-        alignment: Alignment | None = None,
     ) -> None:
-        """``shutter`` is open for so many seconds; ValueError for a lens that cannot be drawn."""
-        self.camera = camera
-        self.lens = lens_of(camera, distortion or Distortion(), alignment or Alignment())
-        self.wide = self.lens.wide if self.lens else camera
+        """``shutter`` is open for so many seconds."""
+        self.camera, self.lens = camera, lens
+        self.wide = lens.wide if lens else camera
         """What a renderer has to draw."""
         self._overlays, self._shutter = overlays, shutter
         self._sensor = sensor or Sensor()

@@ -55,10 +55,10 @@ def _scene(flags: Flags) -> Scene:
 
 
 def _optics(flags: Flags, scene: Scene) -> Optics:
-    camera, distortion, alignment = camera_of(flags)
+    camera, lens = camera_of(flags)
     sensor = Sensor(flags["exposure"], flags["gain"], flags["noise"], flags["seed"])
     overlays = list(load_overlays(scene.overlays, camera.width, camera.height))
-    return Optics(camera, distortion, sensor, overlays, flags["shutter"], alignment)
+    return Optics(camera, lens, sensor, overlays, flags["shutter"])
 
 
 def _start(flags: Flags) -> CameraPose | None:

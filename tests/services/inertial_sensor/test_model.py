@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dodo_dsl.opendlv.attitude import quaternion
+from dodo_dsl.opendlv.attitude import Vector, quaternion, rotation
 from services.dynamic_model.drives import SPEED, BicycleDrive, SingleTrack
 from services.dynamic_model.model import STEERING, Vehicle
 from services.inertial_sensor.model import (
@@ -14,11 +14,9 @@ from services.inertial_sensor.model import (
     BodyState,
     InertialModel,
     Origin,
-    Vector,
     attitude,
     inverse,
     magnetic_field,
-    mounted,
     turned,
 )
 from services.integrator.model import BodyPose, Integrator, Twist, angles
@@ -35,9 +33,9 @@ def upright(yaw: float) -> tuple[Vector, Vector, Vector]:
 def test_a_sensor_at_rest_reads_gravity_upwards_and_one_on_its_side_along_its_axis() -> None:
     for mount, expected in (
         (UPRIGHT, (0.0, 0.0, G)),
-        (mounted(math.pi / 2, 0.0, 0.0), (0.0, G, 0.0)),
-        (mounted(0.0, math.pi / 2, 0.0), (-G, 0.0, 0.0)),
-        (mounted(0.0, 0.0, 1.0), (0.0, 0.0, G)),
+        (rotation(math.pi / 2, 0.0, 0.0), (0.0, G, 0.0)),
+        (rotation(0.0, math.pi / 2, 0.0), (-G, 0.0, 0.0)),
+        (rotation(0.0, 0.0, 1.0), (0.0, 0.0, G)),
     ):
         model = InertialModel(mount=mount)
         model.feed(BodyState(0))
@@ -59,7 +57,7 @@ def test_the_readings_are_the_derivative_of_a_drive() -> None:
     """A car that steers and brakes, at 1 kHz, and the sensor's place differentiated twice."""
     car = SingleTrack(2.7, 1.2, 1.0, 0.6, 0.5, 0.5, 4.0, 8.0, 50.0)
     vehicle, body = Vehicle(BicycleDrive(car)), Integrator(BodyPose((0, 0, 0), quaternion(0, 0, 0.7)))
-    lever, mount = (0.8, 0.3, 0.5), mounted(0.1, -0.2, 0.3)
+    lever, mount = (0.8, 0.3, 0.5), rotation(0.1, -0.2, 0.3)
     model = InertialModel(lever, mount)
     places: list[NDArray[np.float64]] = []
     read: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
@@ -93,14 +91,14 @@ def test_the_compass_turns_with_the_body_and_the_sensor() -> None:
     assert math.hypot(*field) == pytest.approx(5e-5) and field[2] == pytest.approx(-5e-5 * math.sin(math.radians(60)))
     assert math.degrees(math.atan2(field[1], field[0])) == pytest.approx(80)  # east of north, which is y
     for yaw in (0.0, 0.7, 3.0):
-        seen = InertialModel(mount=mounted(0, 0, 0.2)).direction(upright(yaw), field)
+        seen = InertialModel(mount=rotation(0, 0, 0.2)).direction(upright(yaw), field)
         assert math.atan2(seen[1], seen[0]) == pytest.approx(math.remainder(math.radians(80) - yaw - 0.2, math.tau))
 
 
 def test_a_mount_is_as_the_integrator_turns() -> None:
     q = quaternion(0.3, -0.4, 1.1)
-    assert np.array(mounted(0.3, -0.4, 1.1)) == pytest.approx(np.array(attitude(*q)))
-    assert np.array(inverse(mounted(0.3, -0.4, 1.1))) @ np.array(mounted(0.3, -0.4, 1.1)) == pytest.approx(np.eye(3))
+    assert np.array(rotation(0.3, -0.4, 1.1)) == pytest.approx(np.array(attitude(*q)))
+    assert np.array(inverse(rotation(0.3, -0.4, 1.1))) @ np.array(rotation(0.3, -0.4, 1.1)) == pytest.approx(np.eye(3))
     assert attitude(0, 0, 0, 0) is None and attitude(0, 0, math.nan, 1) is None
 
 

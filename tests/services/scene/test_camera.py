@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.scene.camera import CameraPose, Pinhole, euler_rotation, quaternion_rotation
+from dodo_dsl.opendlv.attitude import rotation
+from services.scene.camera import CameraPose, Pinhole, quaternion_rotation
 
 angles = st.floats(-3.0, 3.0)
 
@@ -16,7 +17,7 @@ def test_quaternion_and_euler_angles_agree(roll, pitch, yaw):
     (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a / 2), math.sin(a / 2)) for a in (roll, pitch, yaw))
     w, x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
     y, z = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
-    assert quaternion_rotation(3 * x, 3 * y, 3 * z, 3 * w) == pytest.approx(euler_rotation(roll, pitch, yaw))
+    assert quaternion_rotation(3 * x, 3 * y, 3 * z, 3 * w) == pytest.approx(np.array(rotation(roll, pitch, yaw)))
 
 
 def test_the_pinhole_equation():

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from dodo_dsl import package_data
 from services.scene.camera import CameraPose, Pinhole, still
-from services.scene.lens import Distortion
+from services.scene.lens import Distortion, Lens
 from services.scene.render import Renderer
 from services.scene.scene import load_scene
 from services.scene.truth import SceneTruth, TrueBox, TruthLimits, classes_of
@@ -88,7 +88,8 @@ def test_classes_are_those_written_or_the_models_own_names():
 @pytest.mark.parametrize("k1", [-0.25, 0.4])
 def test_through_a_lens_boxes_are_where_the_lens_shows_the_models(cube_at, k1):
     scene = load_scene(cube_at([3.05, 1.0, 0, 0], [3.05, -0.4, 0.5, 0], half=0.05, height=0.1))
-    optics = Optics(Pinhole(640, 480, FOVY), Distortion(k1, 0.05))
+    camera = Pinhole(640, 480, FOVY)
+    optics = Optics(camera, Lens(camera, Distortion(k1, 0.05)))
     renderer = Renderer(scene, optics.wide.width, optics.wide.height, optics.wide.fovy)
     out, pose = np.empty((480, 640, 4), np.uint8), CameraPose.at(0, 0, 0.3)
     optics.expose(renderer, still(pose), CameraPose.at(0, 0, 0), 0, out)
