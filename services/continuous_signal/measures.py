@@ -153,9 +153,11 @@ class SignalLimits:
         if flags["until"] is not None and flags["until"] <= flags["from"]:
             raise ValueError(f"--until={flags['until']:g} is not after --from={flags['from']:g}")
         self.flags, self.exact = flags, exact
+        self.start: int
+        self.delay: int
         self.band: float | None = band.of_one if isinstance(band, Share) else band
         names = ("from", "hold", "start-up", "max-delay")
-        self.start, self.hold, self.start_up, self.delay = (int(round(flags[name] * MICROSECONDS)) for name in names)
+        self.start, self.hold, self.start_up, self.delay = (round(flags[name] * MICROSECONDS) for name in names)
         self.until = None if flags["until"] is None else round(flags["until"] * MICROSECONDS)
 
     def __getitem__(self, name: str) -> float | None:
