@@ -1,6 +1,7 @@
 """Whether a camera is alive and lit: ``python -m services.camera.health_check --source=...`` prints one JSON object.
 
-It takes the camera's flags. Exit codes: 0 it is, 1 it is not (``reason``) or gives no picture (``error``).
+It takes the camera's flags. Exit codes: 0 it is, 1 it is not (``reason``) or gives no picture (``error``). With
+``--output=FILE`` the picture becomes a PNG, which may fail the check, and the object has its ``width`` and ``height``.
 """
 
 import contextlib
@@ -13,12 +14,13 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from dodo_dsl.opendlv.pixels import Picture
 from services.base import Flags
 from services.base.flags import load_manifest, parse
+from services.base.pictures import OUTPUT, snapshot
 from services.base.process import interruptible
-from services.camera.picture import CameraError, SharedPicture
 from services.camera.service import open_camera
-from services.camera.sources import FIRST, FileCamera, Grabber
+from services.camera.sources import FIRST, CameraError, FileCamera, Grabber, SharedPicture
 
 BRIGHTNESS = 0.04, 0.97
 """Mean brightness of a lit picture, as a share of white."""
@@ -31,16 +33,23 @@ CONTRAST = 0.02
 
 
 def main(argv: Sequence[str], stdout: TextIO) -> int:
+    if any(word.startswith(OUTPUT) for word in argv):
+        return int(snapshot(argv, stdout, _take) != 0)
     try:
-        flags = parse(load_manifest(Path(__file__).parent), [*argv, "--cid=1"])
-        with interruptible():
-            result = check(take_picture(flags))
+        _, result = _take(argv)
     except CameraError as error:
         result = {"ok": False, "reason": " ".join(str(error).split())}
     except (ValueError, OSError) as error:
         result = {"ok": False, "error": " ".join(str(error).split())}
     stdout.write(json.dumps(result) + "\n")
     return 0 if result["ok"] else 1
+
+
+def _take(words: Sequence[str]) -> tuple[Picture, dict[str, Any]]:
+    flags = parse(load_manifest(Path(__file__).parent), [*words, "--cid=1"])
+    with interruptible():
+        picture = take_picture(flags)
+    return picture.argb, check(picture)
 
 
 def check(picture: SharedPicture) -> dict[str, Any]:

@@ -6,8 +6,16 @@ from pathlib import Path
 from services.base import Context, Flags, Output, Service, period_of
 from services.base.pictures import Memories, memories, show
 from services.base.process import interruptible
-from services.camera.picture import CameraError
-from services.camera.sources import FIRST, Camera, FileCamera, Grabber, RpiCamera, V4l2Camera, longest_silence
+from services.camera.sources import (
+    FIRST,
+    Camera,
+    CameraError,
+    FileCamera,
+    Grabber,
+    RpiCamera,
+    V4l2Camera,
+    longest_silence,
+)
 
 EMULATED = "--source=emulated is the camera of 'rig: emulated', which virtual-camera replaces"
 

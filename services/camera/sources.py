@@ -16,15 +16,38 @@ import time
 from collections.abc import Iterator
 from itertools import chain, repeat
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 
 from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.picture_size import too_large
-from services.camera.picture import CameraError, Image, SharedPicture, from_bgr, from_i420
+from dodo_dsl.opendlv.pixels import Picture as Image
+from dodo_dsl.opendlv.pixels import converted
 from services.scene.textures import load_picture
+
+
+class CameraError(RuntimeError):
+    """The camera gives no pictures any more; one sentence."""
+
+
+class SharedPicture(NamedTuple):
+    """In both of OpenDLV's formats, with the time (us since the epoch) at which it was taken, unless from a file."""
+
+    argb: Image
+    i420: Image
+    time: int | None = None
+
+
+def from_bgr(bgr: Image, width: int, height: int, time: int | None = None) -> SharedPicture:
+    """The picture of B, G, R (any height, any width, 3), scaled if it has another size."""
+    if bgr.shape[:2] != (height, width):
+        smaller = bgr.shape[0] * bgr.shape[1] > height * width
+        way = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
+        bgr = np.asarray(cv2.resize(bgr, (width, height), interpolation=way), np.uint8)
+    return SharedPicture(converted(bgr, "bgr", "argb"), converted(bgr, "bgr", "i420"), time)
+
 
 RECORDING = ".rec"
 _SIDES = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
@@ -282,7 +305,7 @@ class RpiCamera:
                 raise CameraError(self._why())
             data += part
         image = np.frombuffer(bytes(data), np.uint8).reshape(self._shape)
-        return from_i420(image, time.time_ns() // 1000)
+        return SharedPicture(converted(image, "i420", "argb"), image, time.time_ns() // 1000)
 
     def close(self) -> None:
         """End the program, with force where it does not go by itself."""

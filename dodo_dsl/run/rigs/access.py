@@ -121,7 +121,7 @@ def occupied(
 
 
 PROGRAMS = {
-    CAMERA: ("python", "-m", "services.camera.snapshot"),
+    CAMERA: ("python", "-m", "services.camera.health_check"),
     DRAWN: ("python", "-m", "services.virtual_camera.snapshot"),
 }
 

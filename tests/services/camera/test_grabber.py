@@ -3,8 +3,7 @@ import threading
 import numpy as np
 import pytest
 
-from services.camera.picture import CameraError, SharedPicture, from_bgr
-from services.camera.sources import Grabber
+from services.camera.sources import CameraError, Grabber, SharedPicture, from_bgr
 
 PATIENCE = 20.0
 

@@ -2,8 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from services.camera.picture import CameraError
-from services.camera.sources import RpiCamera, rpicam_command
+from services.camera.sources import CameraError, RpiCamera, rpicam_command
 
 
 def test_pictures_come_whole_and_in_order(rpicam: Path) -> None:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from services.camera.snapshot import main
+from services.camera.health_check import main
 from tests.services.camera.test_health_check import BOARD
 
 
@@ -30,7 +30,7 @@ def test_a_snapshot_is_the_cameras_picture(tmp_path: Path, divisor: int, reason:
     ("words", "sentence"),
     [
         (("--source=/nowhere.png", "--output=OUT"), "is not a camera"),
-        (("--source=/nowhere.png",), "expected --output=FILE once"),
+        (("--source=/nowhere.png", "--output=a", "--output=b"), "expected --output=FILE once"),
         (("--source=file", "--fil=x", "--output=OUT"), "--fil=x"),
     ],
 )

@@ -7,8 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from services.camera.picture import CameraError
-from services.camera.sources import V4l2Camera
+from services.camera.sources import CameraError, V4l2Camera
 
 DEVICE = Path("/dev/null")
 
