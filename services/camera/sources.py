@@ -5,7 +5,6 @@ are an image, a video or a recording.
 """
 
 import contextlib
-import importlib
 import os
 import select
 import shutil
@@ -22,9 +21,11 @@ import cv2
 import numpy as np
 
 from dodo_dsl.opendlv.address import IMAGE
+from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.picture_size import too_large
 from dodo_dsl.opendlv.pixels import Picture as Image
 from dodo_dsl.opendlv.pixels import converted
+from dodo_dsl.opendlv.recording import read_envelopes
 from services.scene.textures import load_picture
 
 
@@ -106,15 +107,10 @@ def filmed(path: Path) -> Iterator[Image]:
 
 def recorded(path: Path) -> Iterator[Image]:
     """The pictures of an OpenDLV recording's first camera, as B, G, R; raises ValueError if none can be decoded."""
-    try:
-        video = importlib.import_module("dodo_dsl.opendlv.video")
-        reader = importlib.import_module("dodo_dsl.opendlv.recording")
-    except ImportError as error:
-        raise ValueError(f"recordings cannot be read here: {error}") from None
-    from dodo_dsl.opendlv.message_set import MessageSet
+    from dodo_dsl.opendlv import video
 
     messages, decoder, sender = MessageSet.standard(), None, None
-    for envelope in reader.read_envelopes(path):
+    for envelope in read_envelopes(path):
         sender = envelope.sender_stamp if sender is None and envelope.data_type == IMAGE else sender
         if (envelope.data_type, envelope.sender_stamp) == (IMAGE, sender):
             reading = messages.decode(IMAGE, envelope.payload)

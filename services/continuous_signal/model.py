@@ -5,13 +5,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.envelope import MICROSECONDS
 from dodo_dsl.opendlv.recording_times import DAY
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.base.evaluator import EARLY, Hidden
-from services.base.judged import FAILED, MOST_SAMPLES, WARNED
+from services.base.judged import FAILED, WARNED
 from services.base.service import said
 from services.continuous_signal.measures import (
     Coverage,
@@ -238,7 +237,7 @@ class SignalEvaluator(Evaluator):
             yield f"samples of {self._signal} came {delay / MICROSECONDS:.2f} s after their time (median)"
 
     def record(self) -> None:
-        """All samples with the target, which a live one may send afterwards; of very many those that are farthest."""
+        """All samples with the target, which a live one may send afterwards."""
         target = self._target or in_order(*self._targets.since(self.zero))
         start = self.zero if self._from_begin else target.start
         times, values = self._samples.since(start)
@@ -250,7 +249,7 @@ class SignalEvaluator(Evaluator):
         marks[(times < limits.start) | (times > (np.inf if limits.until is None else limits.until))] = 0
         if abs(start - self.zero) > DAY:  # of another day: from the start of the test on
             start = self.zero
-        for chosen in farthest_of(np.argsort(times, kind="stable"), np.nan_to_num(away, nan=-1.0)):
+        for chosen in np.argsort(times, kind="stable"):
             self.plot.add(start + int(times[chosen]), float(values[chosen]), mark=int(marks[chosen]))
         for time, value in zip(target.times.tolist(), target.values.tolist(), strict=True):
             self.plot.aim(start + time, value)
@@ -283,10 +282,3 @@ class SignalEvaluator(Evaluator):
             return int(target.times[-1])
         observed: int = newest.time - target.start + (now - newest.arrival)
         return max(observed, min(now - self.zero, round(self._max_time * MICROSECONDS)) - self._limits.delay)
-
-
-def farthest_of(order: NDArray[np.int64], away: Values) -> list[int]:
-    """Samples in an order, or where they are more than are recorded, of each few the one that is farthest away."""
-    each = -(-len(order) // MOST_SAMPLES) or 1
-    parts = [order[begin : begin + each] for begin in range(0, len(order), each)]
-    return [int(part[np.argmax(away[part])]) for part in parts]

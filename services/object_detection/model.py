@@ -199,7 +199,7 @@ class DetectionEvaluator(Evaluator):
             is_shown = not (self._truth and self._truth.frames == "sample-time" and self.hidden_samples.hides(key))
             if self._truth and is_shown and (span.is_complete or key < self._last):
                 counts = compare((), self._truth.pictures[key], self._flags["iou"], self._flags["classes"])
-                self._count(counts, JudgedFrame(key, f"of picture {key}", None), {"picture": key})
+                self._count(counts, key, f"of picture {key}", {"picture": key})
         if self._truth is None or span.is_complete:
             self._require_truth(span.within)
         end = self.elapsed(self.now if self._ended is None else self._ended) if self.now is not None else 0.0
@@ -233,10 +233,12 @@ class DetectionEvaluator(Evaluator):
             frame.answered = self.elapsed(self.now)
             self._silence.answers.append(frame.answered)
 
-    def _count(self, counts: CountsByClass, frame: JudgedFrame, key: Mapping[str, float]) -> None:
-        total = counts.total()
-        self._score.add(counts, frame.place, frame.answered is not None, key)
-        self._silence.frames.append(frame._replace(expects=bool(total.hits + total.missed)))
+    def _count(
+        self, counts: CountsByClass, order: int, place: str, key: Mapping[str, float], answered: float | None = None
+    ) -> None:
+        frame = JudgedFrame(order, place, key, answered, counts.total())
+        self._score.add(frame, counts)
+        self._silence.frames.append(frame)
 
     def _take(self, key: FrameKey, number: int, value: Value, side: Callable[[DetectedFrame], Detections]) -> None:
         frame = self._frame(key)
@@ -285,7 +287,7 @@ class DetectionEvaluator(Evaluator):
         order = frame.key.number if self._truth and self._truth.frames == "number" else frame.key.time
         time = self._time(frame)
         key = {"time": time, "sample-time": frame.key.time, "sample-id": frame.key.number}
-        self._count(counts, JudgedFrame(order, f"at {time:.2f} s", frame.answered), key)
+        self._count(counts, order, f"at {time:.2f} s", key, frame.answered)
 
     def _time(self, frame: DetectedFrame, farthest: float = _OTHER_CLOCK) -> float:
         """When a frame was sampled, in s; when it came, where its sample time is of another clock, as in recordings."""

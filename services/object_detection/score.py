@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise
-from types import MappingProxyType
 from typing import NamedTuple
 
 from services.base import Check, Flags, JudgedBoxes
@@ -146,15 +145,21 @@ def _ratio(part: float, whole: int) -> float | None:
 
 
 class JudgedFrame(NamedTuple):
-    """A frame by its ``order`` among others, and its ``place`` in sentences.
+    """A frame by its ``order`` among others, its ``place`` in sentences, and what identifies it in the evidence.
 
-    ``answered`` in s of the test, None for no answer; ``expects`` one: it has true boxes that count.
+    ``answered`` in s of the test, None for no answer; ``counts`` are of all its classes.
     """
 
     order: int
     place: str
+    key: Mapping[str, float]
     answered: float | None
-    expects: bool = True
+    counts: Counts
+
+    @property
+    def expects(self) -> bool:
+        """Whether it has true boxes that count, and so expects an answer."""
+        return bool(self.counts.hits + self.counts.missed)
 
 
 class Unanswered(NamedTuple):
@@ -215,14 +220,6 @@ MOST_CLASSES = 20
 """So many classes that only the application names have checks: the runner reads lines of 64 KiB."""
 
 
-class WorstFrame(NamedTuple):
-    """The frame with the most mistakes, where it was, and what was wrong; ``key`` identifies it in the evidence."""
-
-    place: str
-    counts: Counts
-    key: Mapping[str, float]
-
-
 @dataclass
 class Score:
     """Counts of the judged frames, and what was left out.
@@ -239,24 +236,22 @@ class Score:
     late: int = 0
     early: int = 0
     repeated: int = 0
-    worst: WorstFrame | None = None
+    worst: JudgedFrame | None = None
+    """The frame with the most mistakes."""
     unanswered: Unanswered = field(default_factory=lambda: Unanswered(0, 0))
     gap: Gap | None = None
 
-    def add(
-        self, frame: CountsByClass, place: str, answered: bool, key: Mapping[str, float] = MappingProxyType({})
-    ) -> None:
-        """Add a frame's counts; ``place`` names it in sentences, ``key`` in the evidence."""
+    def add(self, frame: JudgedFrame, found: CountsByClass) -> None:
+        """Add a frame, and its counts by class."""
         self.frames += 1
-        self.answered += answered
-        for label, counts in frame:
+        self.answered += frame.answered is not None
+        for label, counts in found:
             self.counts.add(label, counts)
-        self.counts.kinds += frame.kinds
-        self.counts.missed += frame.missed
-        self.counts.found += frame.found
-        counts = frame.total()
-        if counts.mistakes > (self.worst.counts.mistakes if self.worst else 0):
-            self.worst = WorstFrame(place, counts, key)
+        self.counts.kinds += found.kinds
+        self.counts.missed += found.missed
+        self.counts.found += found.found
+        if frame.counts.mistakes > (self.worst.counts.mistakes if self.worst else 0):
+            self.worst = frame
 
     def evidence(self) -> dict[str, float | str | None]:
         """The worst frame with its counts, and the longest silence; times in s of the test."""

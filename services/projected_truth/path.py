@@ -1,15 +1,10 @@
-"""Where a vehicle was when a picture was taken, from the poses measured before and after it.
-
-The pictures are those that another program shares; their sample times are followed in its memory.
-"""
+"""Where a vehicle was when a picture was taken, from the poses measured before and after it."""
 
 from bisect import bisect_left
 from collections import deque
 from operator import itemgetter
 
 from dodo_dsl.opendlv.envelope import MICROSECONDS
-from dodo_dsl.opendlv.shared_memory import SharedMemory
-from services.base.polled_memory import PolledMemory
 from services.scene.camera import LONGEST_GAP, CameraPose, motion_between, still
 
 _KEPT = 256
@@ -61,24 +56,3 @@ class MeasuredPath:
         before = self._poses[-2] if len(self._poses) > 1 else None
         motion = motion_between(before[1], pose, last - before[0]) if before else still(pose)
         return motion.after((time - last) / MICROSECONDS)
-
-
-_PATIENCE = 0.02
-"""s to wait for the memory's lock."""
-
-
-class FollowedMemory(PolledMemory):
-    """The sample times of the pictures in a memory."""
-
-    def __init__(self, name: str) -> None:
-        super().__init__(name, _PATIENCE)
-
-    def new(self, now: int) -> int | None:
-        """The sample time of the picture in it, in us, if that was not passed on yet."""
-        return self.poll(now, self._new)
-
-    def _new(self, _memory: SharedMemory, time: int) -> int | None:
-        if time == self.last:
-            return None
-        self.last = time
-        return time

@@ -11,7 +11,8 @@ import cv2
 
 from dodo_dsl.opendlv.envelope import MICROSECONDS
 from services.base import Context, Flags, Output, Service
-from services.projected_truth.path import FollowedMemory, MeasuredPath
+from services.base.polled_memory import PolledMemory
+from services.projected_truth.path import MeasuredPath
 from services.scene.camera import CameraPose, body_pose, mount
 from services.scene.lens import Lens, camera_of
 from services.scene.render import Renderer
@@ -21,6 +22,7 @@ from services.scene.truth import TruthSender, truth_sender
 PATIENCE = 250_000
 """us after a picture in which a pose measured later has to come; then the vehicle counts as moving on evenly."""
 _MOST = 64
+_LOCK_PATIENCE = 0.02  # s
 
 _log = logging.getLogger(__name__)
 
@@ -101,12 +103,20 @@ def build(context: Context) -> Service:
     sender = truth_sender(context, renderer, lens)
     assert sender is not None, "--truth-sender is required"
     mounted = mount(*(flags[name] for name in ("x", "y", "z", "roll", "pitch", "yaw")))
-    memory = FollowedMemory(flags["follow"])
+    memory = PolledMemory(flags["follow"], _LOCK_PATIENCE)
     context.resources.callback(memory.close)
     latency = round(flags["latency"] * MICROSECONDS)
-    service = ProjectedTruth(sender, mounted, memory.new, flags["frame-id"], latency)
+    service = ProjectedTruth(sender, mounted, partial(_new_picture, memory), flags["frame-id"], latency)
     context.resources.callback(service.tell)
     return service
+
+
+def _new_picture(memory: PolledMemory, now: int) -> int | None:
+    """The sample time of the picture in a memory, in us, if that was not passed on yet."""
+    time = memory.poll(now, lambda _, time: None if time == memory.last else time)
+    if time is not None:
+        memory.pass_over(time)
+    return time
 
 
 def _open(flags: Flags) -> tuple[Renderer, Lens | None]:

@@ -35,7 +35,6 @@ def test_what_holds_no_pictures(tmp_path: Path) -> None:
 
 
 def test_a_recording(shared_data) -> None:  # type: ignore[no-untyped-def]
-    pytest.importorskip("dodo_dsl.opendlv.video", reason="recordings come with a later version")
     camera = FileCamera(shared_data("track-1-2025-05-08.rec"), 640, 360)
     first, second = camera.take(), camera.take()
     assert first.argb.shape == second.argb.shape == (360, 640, 4)
