@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 
 from dodo_dsl.opendlv.message_set import MessageSet
-from services.base import Context, Flags, UnjudgeableError, UnusableMessageError
-from services.collision.model import REQUESTS
+from services.base import Context, UnjudgeableError, UnusableMessageError
+from services.base.flags import load_manifest, parse
 from services.collision.service import Collision
+from tests.services.process import ROOT
 
 FRAME = "opendlv.sim.Frame"
 LANE = {
@@ -30,35 +31,21 @@ def lane(tmp_path: Path) -> Iterator[Path]:
     yield tmp_path
 
 
+MANIFEST = load_manifest(ROOT / "services" / "collision")
+
+
 def service(lane: Path, wall: Callable[[], float] = time.monotonic, on_rig: bool = False, **changes: Any) -> Collision:
-    flags = {
-        "length": 0.36,
-        "width": 0.16,
-        "height": 0.15,
+    words = {
         "goal": "finish",
-        "walls": ["left", "right"],
-        "max-time": 40.0,
+        "walls": "left,right",
+        "max-silence": 60,
+        "max-time": 40,
+        "map-path": lane,
+        "frame-id": 2,
+        **changes,
     }
-    none: dict[str, Any] = {
-        "gates": [],
-        "min-margin": 0.0,
-        "requests": list(REQUESTS),
-        "max-silence": 60.0,
-        "max-speed": None,
-        "bodies": None,
-        "min-body-margin": None,
-        "min-distance": None,
-        "height": None,
-    }
-    return Collision(
-        Context(
-            "collision",
-            Flags({**flags, **none, "map-path": str(lane), "frame-id": 2, **changes}),
-            MessageSet.standard(),
-            on_rig=on_rig,
-        ),
-        wall,
-    )
+    flags = [f"--{name}={value}" for name, value in {"cid": 128, **words}.items() if value is not None]
+    return Collision(Context("collision", parse(MANIFEST, flags), MessageSet.standard(), on_rig=on_rig), wall)
 
 
 def frame(x: float, y: float, heading: float = 0.0) -> Any:
@@ -104,11 +91,11 @@ def test_frames_that_stop_are_no_verdict_about_the_application(lane: Path) -> No
     ("changes", "message"),
     [
         ({"goal": "left"}, "--goal: left is one of the --walls too"),
-        ({"gates": ["finish", "left"]}, "--gates: left is one of the --walls too"),
-        ({"gates": ["finnish"]}, "--gates: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"),
-        ({"walls": [], "min-margin": 0.1}, "--min-margin needs --walls"),
-        ({"requests": []}, "--requests is empty: a drive is the application's only if it sends something"),
-        ({"requests": ["opendlv.proxy.PedalPositionRequest/x"]}, "Request/x' has no whole number as its sender stamp"),
+        ({"gates": "finish,left"}, "--gates: left is one of the --walls too"),
+        ({"gates": "finnish"}, "--gates: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"),
+        ({"walls": None, "min-margin": 0.1}, "--min-margin needs --walls"),
+        ({"requests": ""}, "--requests is empty: a drive is the application's only if it sends something"),
+        ({"requests": "opendlv.proxy.PedalPositionRequest/x"}, "Request/x' has no whole number as its sender stamp"),
         ({"goal": "finnish"}, "has no obstacle 'finnish'; did you mean 'finish'?"),
         ({"bodies": True}, "--bodies: no model of the map has 'frames' of other sender stamps than the vehicle's"),
     ],
@@ -136,7 +123,7 @@ def test_frames_of_bodies_are_judged(lane: Path) -> None:
 def test_a_block_of_the_map_is_hit(lane: Path) -> None:
     box = {"name": "crate", "dimension": [0.1, 0.1, 0.3], "color": [1, 0, 0], "instances": [[1.0, 0.1, 0.0, 0.0]]}
     (lane / "map.json").write_text(json.dumps({**LANE, "block": [box]}))
-    judge = service(lane, walls=["*", "blocks"])
+    judge = service(lane, walls="*,blocks")
     judge.begin(START)
     for step in range(10):
         judge.inputs[FRAME, 2](frame(step / 10, 0), START + step * 100_000)

@@ -29,13 +29,10 @@ def test_what_is_left_out_is_the_kiwi_car(tmp_path: Path) -> None:
     ("text", "sentence"),
     [
         ("", ":1: $: expected an object, found null"),
-        ("- mass\n", ":1: $: expected an object"),
         ("mass: 1\n\nmas: 2\n", ":3: $.mas: nothing reads 'mas'"),
         ("mass: heavy\n", ":1: $.mass: expected a number, found"),
-        ("mass: [1]\n", ":1: $.mass: expected a number"),
         ("mass: .nan\n", ":1: $.mass: expected a number"),
         ("front: 1\nmass: 0\n", ":2: $.mass: expected a number > 0.0, found"),
-        ("gain-forward: -1\n", ":1: $.gain-forward: expected a number >= 0.0, found"),
         ("pedal-reverse: 0.5\n", ":1: $.pedal-reverse: expected a number <= 0.0, found"),
         ("mass: [1\n", ":2: neither YAML nor JSON: "),
     ],

@@ -5,8 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.assets.problem import InputError
 from services.object_detection.boxes import Box, FrameKey, LabelledBox, load_truth
@@ -65,22 +63,12 @@ def change(path: tuple[Any, ...], value: Any) -> Callable[[dict[str, Any]], None
     [
         (("images",), None, ": $.images: expected a list, found null"),
         (("annotations",), [], ": $.annotations: no boxes, expected at least one"),
-        (("annotations", 0), 3, ": $.annotations[0]: expected an object"),
         (("annotations", 0, "image_id"), 6, ": $.annotations[0].image_id: no entry has the id 6"),
-        (("annotations", 1, "category_id"), "2", ": $.annotations[1].category_id: expected a whole number, found"),
-        (
-            ("annotations", 1, "bbox"),
-            [1, 2, 3],
-            ": $.annotations[1].bbox: expected a list of length 4, found [1, 2, 3]",
-        ),
-        (("annotations", 1, "bbox"), [1, 2, 3, True], ": $.annotations[1].bbox[3]: expected a number, found true"),
         (("annotations", 1, "bbox"), [1, 2, 3, 10**400], ": $.annotations[1].bbox[3]: Number out of range"),
         (("annotations", 1, "bbox"), [1, 2, 3, 0], ": $.annotations[1].bbox: has no area, 3 x 0 pixels"),
         (("annotations", 1, "bbox"), [640, 2, 3, 3], ": $.annotations[1].bbox: lies outside its image of 640 x 480"),
         (("annotations", 1, "bbox"), [-3, 2, 3, 3], ": $.annotations[1].bbox: lies outside its image of 640 x 480"),
         (("annotations", 0, "iscrowd"), 1, ": $.annotations[0].bbox: iscrowd is set, expected the box of one object"),
-        (("categories", 0, "name"), "color: ", ": $.categories[0].name: expected a text"),
-        (("images", 0, "width"), 0, ": $.images[0].width: expected a whole number >= 1"),
         (("images", 0, "sample_time"), 1.5, ": $.images[0].sample_time: expected a whole number, found 1.5"),
         (("images", 1, "id"), 4, ": $.images: two have the same id"),
         (("images", 1, "sample_time"), 1_000_000, ": $.images: two have the same sample_time"),
@@ -93,33 +81,3 @@ def test_what_is_refused(tmp_path: Path, path: tuple[Any, ...], value: Any, said
     with pytest.raises(InputError) as raised:
         load_truth(file, "sample-time")
     assert str(raised.value).startswith(f"{file}{said}")
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("[1, 2", ":1:6: not JSON: input data was truncated"),
-        ("\x00", ":1:1: not JSON: invalid character"),
-        ("[" * 100_000, ": the JSON is nested too deeply"),
-    ],
-)
-def test_files_that_are_no_json(tmp_path: Path, text: str, said: str) -> None:
-    with pytest.raises(InputError) as raised:
-        load_truth(path := write(tmp_path, text), "one")
-    assert str(raised.value).startswith(f"{path}{said}")
-    for other in (tmp_path / "absent.json", tmp_path):
-        with pytest.raises(InputError, match=r"No such file|Is a directory"):
-            load_truth(other, "one")
-
-
-KEYS = ["images", "annotations", "categories", "id", "name", "bbox", "width", "height", "image_id", "category_id"]
-values = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=3)
-
-
-@pytest.mark.slow
-@example("0:")
-@given(st.recursive(values, lambda v: st.lists(v, max_size=3) | st.dictionaries(st.sampled_from(KEYS), v)))
-def test_any_json_is_a_truth_or_one_sentence(tmp_path_factory: pytest.TempPathFactory, document: Any) -> None:
-    path = write(tmp_path_factory.getbasetemp(), document)
-    with pytest.raises(InputError, match=r"truth\.json(:\d+:\d+)?: "):
-        load_truth(path, "number")

@@ -202,6 +202,7 @@ def test_true_boxes_follow_as_three_messages_each(camera):
         ("--truth-classes=cone_green", "no model 'cone_green' in the map, which has cone_yellow, cone_blue, cone_red"),
         ("--lines=middle", "no obstacle 'middle' with lines; the map has behind, beyond, finish, left, right"),
         ("--distortion.k1=-1.5", "its distortion folds the picture"),
+        ("--map-path=/nowhere", "/nowhere: cannot be read: No such file"),
     ],
 )
 def test_what_cannot_be_is_told(camera, flag, message):

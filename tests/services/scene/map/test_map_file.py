@@ -56,25 +56,17 @@ def test_a_real_map_is_read(shared_data, tmp_path):
 BAD_MODELS = [
     ({"instances": [[1, 2, 3]]}, "$.model[0].instances[0]: expected a list of length 4, found [1, 2, 3]"),
     ({"instances": [[1, 2, 3, "a"]]}, '$.model[0].instances[0][3]: expected a number, found "a"'),
-    ({"instances": [[1, 2, 3, True]]}, "$.model[0].instances[0][3]: expected a number, found true"),
     ({"instances": [[1, 2e9, 3, 0]]}, "$.model[0].instances[0][1]: expected a number <= 100000.0, found 2000000000.0"),
-    ({"instances": {}}, "$.model[0].instances: expected a list, found {}"),
     ({"color": [1, 2, 3]}, "$.model[0].color[1]: expected a number <= 1.0, found 2"),
-    ({"color": "red"}, '$.model[0].color: expected a list, found "red"'),
     ({"color": ...}, "$.model[0]: 'color' or 'textureFile' is missing"),
-    ({"file": ...}, "$.model[0]: 'file' is missing"),
     ({"file": 3}, "$.model[0].file: expected a regular file in the map's folder, found 3"),
     ({"file": "cone.obj"}, "$.model[0].file: expected a regular file in the map's folder"),
     ({"file": "../cube.obj"}, "$.model[0].file: expected a file inside the map's folder"),
     ({"file": "/etc/passwd"}, "$.model[0].file: expected a file inside the map's folder"),
     ({"file": "a\0b"}, "$.model[0].file: expected "),
-    ({"name": ...}, "$.model[0]: 'name' is missing"),
-    ({"frames": 1}, "$.model[0].frames: expected a list, found 1"),
     ({"frames": [1.0]}, "$.model[0].frames[0]: expected a whole number, found 1.0"),
-    ({"frames": [0, True]}, "$.model[0].frames[1]: expected a whole number"),
     ({"frames": [2**32]}, "$.model[0].frames[0]: expected a whole number"),
     ({"frames": [3, 3]}, "$.model[0]: a sender stamp appears twice among its frames"),
-    ({"frames": list(range(101))}, "$.model[0].frames: expected a list of length <= 100"),
 ]
 
 
@@ -87,7 +79,6 @@ def test_a_bad_model_is_told_with_its_place(write_map, change, message):
 
 BAD_BLOCKS = [
     ({"dimension": [1, 0, 1]}, "$.block[0].dimension[1]: expected a number > 0.0, found 0"),
-    ({"dimension": ...}, "$.block[0]: 'dimension' is missing"),
     ({"textureSize": [1]}, "$.block[0].textureSize: expected a list of length 2, found [1]"),
     ({"color": ...}, "$.block[0]: 'color' or 'textureFile' is missing"),
     ({"instances": [[0, 0, 0, 0]] * (MAX_BLOCKS + 1)}, "501 instances of blocks, expected at most 500"),
