@@ -24,7 +24,7 @@ from dodo_dsl.plan.test_files import file_problem
 from dodo_dsl.report.results import FILE_NAME
 from dodo_dsl.run.backends import Job
 from dodo_dsl.search.space import space_of, sweep
-from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.model import CLOCKS
 from dodo_dsl.spec.rig import SIMULATION_TAG
@@ -54,7 +54,8 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
             raise UsageError(
                 "--compiled runs a test as it was compiled: TEST, --level, --samples and --application do not apply"
             )
-        plans, deployment = [load_compiled(folder, settings) for folder in options.compiled], _deployment(stdout)
+        plans = [load_compiled(folder, settings) for folder in options.compiled]
+        deployment = selection.checked_deployment()
         folders = {plan.slug: path.resolve() for plan, path in zip(plans, options.compiled, strict=True)}
         if len(folders) < len(plans):
             raise UsageError("--compiled names two tests of one name, or one of them twice")
@@ -88,14 +89,6 @@ def load_compiled(folder: Path, settings: Settings) -> Plan:
     if settings.isolation == "network" and plan.is_real:
         raise UsageError(f"rig '{plan.rig}' is reached through the host, not with --isolation network")
     return plan
-
-
-def _deployment(stdout: TextIO) -> Deployment:
-    deployment, problems = load_deployment(find_deployment(Path.cwd()))
-    write_diagnostics(stdout, problems)
-    if has_errors(problems):
-        raise UsageError("dodo.yml has errors, so its CIDs and subnets are unknown")
-    return deployment
 
 
 def _usable(report: Path, slugs: Sequence[str]) -> Path:

@@ -25,7 +25,6 @@ _PATIENCE_S = 60.0
 _MOST_BYTES = 16 << 30
 """Of a report, unpacked."""
 _MOST_JSON = 16 << 20
-_MOST_PAGES = 100
 
 
 class NoChildJobs(ValueError):
@@ -45,12 +44,10 @@ class ParentPipeline:
     def json(self, path: str) -> Iterator[dict[str, Any]]:
         """The elements of a list, page by page; raises NoChildJobs."""
         page = "1"
-        for _ in range(_MOST_PAGES):
+        while page:
             with self.opened(f"{path}?per_page=100&page={page}") as response:
                 yield from json.loads(response.read(_MOST_JSON))
                 page = response.headers.get("x-next-page") or ""
-            if not page:
-                return
 
     def opened(self, path: str) -> Any:
         """A response; the token goes to no other host. Raises NoChildJobs."""
@@ -68,13 +65,13 @@ class ParentPipeline:
 
 def of_job(environment: Mapping[str, str]) -> ParentPipeline:
     """The pipeline of the job that this runs in; raises NoChildJobs."""
-    for name in (*_NEEDED, "CI_JOB_TOKEN"):
-        if not environment.get(name) and not (name == "CI_JOB_TOKEN" and environment.get(VARIABLE)):
+    own = environment.get(VARIABLE)
+    for name in _NEEDED if own else (*_NEEDED, "CI_JOB_TOKEN"):
+        if not environment.get(name):
             raise NoChildJobs(f"{name} is not set; --gitlab is for jobs of GitLab")
     api, project, number = (environment[name] for name in _NEEDED)
     if not api.startswith(("http://", "https://")):
         raise NoChildJobs(f"CI_API_V4_URL is '{api[:60]}', expected a URL")
-    own = environment.get(VARIABLE, "")
     header = ("PRIVATE-TOKEN", own) if own else ("JOB-TOKEN", environment["CI_JOB_TOKEN"])
     return ParentPipeline(f"{api}/projects/{project}", number, header)
 
@@ -84,24 +81,26 @@ def fetch(pipeline: ParentPipeline, folder: Path) -> tuple[list[GivenReport], li
 
     Raises NoChildJobs where GitLab does not list them.
     """
-    reports, sentences = list[GivenReport](), list[str]()
     try:
         children = [each.get("downstream_pipeline") for each in pipeline.json(f"pipelines/{pipeline.number}/bridges")]
         jobs = [job for child in children if child for job in pipeline.json(f"pipelines/{int(child['id'])}/jobs")]
-        for job in sorted(jobs, key=lambda each: int(each["id"])):
-            name, number = str(job["name"]), int(job["id"])
-            place = folder / str(number)
-            try:
-                if job.get("artifacts_file"):
-                    _fetch(pipeline, number, place)
-                if (place / FOLDER).is_dir():
-                    reports.append(read_given(place / FOLDER))
-                elif job.get("artifacts_file") or job.get("status") != "success":
-                    sentences.append(f"job '{name}' has no report")
-            except (NoChildJobs, ResultsError) as problem:
-                sentences.append(f"job '{name}' is left out: {str(problem).replace(f'{place}/', '')}")
+        named = sorted((int(j["id"]), str(j["name"]), bool(j.get("artifacts_file")), str(j["status"])) for j in jobs)
+    except NoChildJobs:
+        raise
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise error if isinstance(error, NoChildJobs) else NoChildJobs("GitLab's answer lists no jobs") from error
+        raise NoChildJobs("GitLab's answer lists no jobs") from error
+    reports, sentences = list[GivenReport](), list[str]()
+    for number, name, has_artifacts, status in named:
+        place = folder / str(number)
+        try:
+            if has_artifacts:
+                _fetch(pipeline, number, place)
+            if (place / FOLDER).is_dir():
+                reports.append(read_given(place / FOLDER))
+            elif has_artifacts or status != "success":
+                sentences.append(f"job '{name}' has no report")
+        except (NoChildJobs, ResultsError) as problem:
+            sentences.append(f"job '{name}' is left out: {str(problem).replace(f'{place}/', '')}")
     return reports, sentences
 
 
@@ -110,7 +109,6 @@ def _fetch(pipeline: ParentPipeline, number: int, folder: Path) -> None:
 
     Extracted files are regular ones below ``folder``, whatever the archive names or calls a link.
     """
-    folder.mkdir()
     with pipeline.opened(f"jobs/{number}/artifacts") as response, tempfile.TemporaryFile() as archive:
         try:
             shutil.copyfileobj(response, archive)

@@ -1,48 +1,31 @@
 "use strict";
-// Search and filters of the tests. Without this script the page shows all of them, what did not pass first.
+// Search and filter of the tests. Without this script the page shows all of them, what did not pass first.
 (function () {
   const form = document.getElementById("_filters");
-  const count = document.getElementById("_count");
-  const list = document.getElementById("_tests");
-  const matrices = Array.from(list.querySelectorAll(".matrix"), (element) => ({ element, isOpen: element.open }));
-  const tests = Array.from(list.querySelectorAll(".test"), (element) => ({ element, text: null }));
-
-  function text(test) {
-    if (test.text === null) test.text = test.element.textContent.toLowerCase();
-    return test.text;
-  }
-
-  function isWanted(test, words) {
-    const wanted = form.elements.outcome.value;
-    return (wanted === "all" || test.element.dataset.outcome === wanted) && words.every((word) => text(test).includes(word));
-  }
+  const tests = Array.from(document.querySelectorAll(".test"));
 
   function filter() {
-    const words = form.elements.search.value.toLowerCase().split(/\s+/).filter(Boolean);
-    let shown = 0;
+    const [outcome, search] = ["outcome", "search"].map((name) => form.elements[name].value.toLowerCase());
+    const words = search.split(/\s+/).filter(Boolean);
     for (const test of tests) {
-      test.element.hidden = !isWanted(test, words);
-      if (!test.element.hidden) shown += 1;
+      const text = words.length ? test.textContent.toLowerCase() : "";
+      test.hidden = !(["all", test.dataset.outcome].includes(outcome) && words.every((word) => text.includes(word)));
     }
-    for (const { element, isOpen } of matrices) {
-      element.hidden = !element.querySelector(".test:not([hidden])");
-      element.open = shown < tests.length || isOpen;
+    const shown = tests.filter((test) => !test.hidden).length;
+    for (const matrix of document.querySelectorAll(".matrix")) {
+      matrix.hidden = !matrix.querySelector(".test:not([hidden])");
+      matrix.open ||= shown < tests.length;
     }
-    const all = tests.length === 1 ? "1 test" : `${tests.length} tests`;
-    count.textContent = shown === tests.length ? all : `${shown} of ${all}`;
+    document.getElementById("_count").textContent = `${shown} of ${tests.length}`;
   }
 
   // A link to a test shows it, also where filters hide it, with its details.
   function reveal() {
-    const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
-    if (!target || !target.classList.contains("test")) return;
-    if (target.hidden) {
-      form.reset();
-      filter();
-    }
-    const matrix = target.closest(".matrix");
-    if (matrix) matrix.open = true;
-    target.querySelector("details").open = true;
+    const target = tests.find((test) => `#${test.id}` === location.hash);
+    if (!target) return;
+    form.reset();
+    filter();
+    for (const closed of [target.closest(".matrix"), target.querySelector("details")]) if (closed) closed.open = true;
     target.scrollIntoView();
   }
 

@@ -14,8 +14,7 @@ dodo.log = (function () {
   function row([time, service, level, text]) {
     const when = make("time", {}, time === null ? "–" : time.toFixed(2));
     const move = () => time !== null && dodo.cursor.move(time);
-    const state = time === null ? level : `${level} later`;
-    return make("p", { class: state, onclick: move }, when, make("b", { title: services[service] }, services[service]), make("span", {}, text));
+    return make("p", { class: level, onclick: move }, when, make("b", { title: services[service] }, services[service]), make("span", {}, text));
   }
 
   function isShown([, service, level, text]) {
@@ -34,7 +33,6 @@ dodo.log = (function () {
     if (n === current && !isFiltered) return;
     if (current >= 0) rows[current].classList.remove("now");
     if (n >= 0) rows[n].classList.add("now");
-    for (let each = Math.min(n, current) + 1; each <= Math.max(n, current); each++) rows[each].classList.toggle("later", each > n);
     current = n;
     const place = rows[Math.max(n, 0)];
     list.scrollTop = place ? place.offsetTop - list.offsetTop - list.clientHeight * 0.7 : 0;

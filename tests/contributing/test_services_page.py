@@ -7,8 +7,8 @@ import pytest
 
 from dodo_dsl.report import results
 from dodo_dsl.report.join import read_document
-from dodo_dsl.report.viewer.encoded import unpacked
 from tests.contributing.tutorial import follow
+from tests.report.viewer.drives import unpacked
 
 PAGE = Path(__file__).parents[2] / "docs/how-to/services.md"
 

@@ -5,7 +5,6 @@ import json
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dodo_dsl.terminal import printable
 
@@ -26,11 +25,6 @@ def shown(text: object, most: int = MOST_TEXT) -> str:
     line = str(text)
     more = f" … ({len(line)} characters)" if len(line) > most else ""
     return printable(line[:most]) + more
-
-
-def unpacked(text: str) -> NDArray[np.float32]:
-    """The numbers that ``packed`` made this of; raises ValueError."""
-    return np.frombuffer(base64.b64decode(text, validate=True), "<f4")
 
 
 def script(document: Any) -> str:

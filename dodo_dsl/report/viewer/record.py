@@ -4,7 +4,7 @@ An evaluator of someone's own records as the shipped ones do, and nothing here k
 """
 
 import base64
-from collections.abc import Iterator
+import contextlib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,8 @@ _BOX = {"hit": 6, "false": 5, "missed": 5}
 """Kinds of boxes, and how many texts and numbers each has after its kind."""
 _ROLES = ("wall", "gate", "goal")
 _MOST_BYTES = 16 << 20
+_Part = tuple[Values, Values, bytes]
+_Parts = list[_Part]
 
 
 class Line(msgspec.Struct):
@@ -67,19 +69,12 @@ class Line(msgspec.Struct):
             "note": ", ".join(notes),
         }
 
-    def part(self) -> tuple[Values, Values, bytes]:
+    def part(self) -> _Part:
         """Times in us of the test, values and marks."""
         times, values = (np.frombuffer(data, "<f4").astype(np.float64) for data in (self.times, self.values))
         if not len(times) == len(values) == len(self.marks):
             raise ValueError("parts of different lengths")
         return self.zero + times * MICROSECONDS, values, self.marks
-
-
-@dataclass
-class _Series:
-    about: dict[str, Any]
-    samples: list[tuple[Values, Values, bytes]] = field(default_factory=list)
-    target: list[tuple[Values, Values, bytes]] = field(default_factory=list)
 
 
 @dataclass
@@ -94,15 +89,15 @@ class JudgedRecord:
     silent: list[str] = field(default_factory=list)
     messages: list[dict[str, Any]] = field(default_factory=list)
     cut: int = 0
-    _series: dict[tuple[str, str], _Series] = field(default_factory=dict)
+    _series: dict[tuple[str, str], tuple[dict[str, Any], _Parts, _Parts]] = field(default_factory=dict)
     _frames: dict[int, dict[str, Any]] = field(default_factory=dict)
 
     def series(self, begin: int) -> list[dict[str, Any]]:
         """One plot each; ``begin`` of the test in us, from which on its times count."""
         return [
-            {**each.about, **_columns(each.samples, begin), "target": _columns(each.target, begin)}
-            for each in self._series.values()
-            if each.samples or each.target
+            {**about, **_columns(samples, begin), "target": _columns(target, begin)}
+            for about, samples, target in self._series.values()
+            if samples or target
         ]
 
     def frames(self, begin: int) -> list[dict[str, Any]]:
@@ -119,11 +114,11 @@ class JudgedRecord:
     def take(self, service: str, line: Line) -> None:
         """A line of a record; raises KeyError and ValueError for one that does not fit the lines before."""
         if line.series is not None:
-            self._series[service, line.series] = _Series(line.about(service))
+            self._series[service, line.series] = (line.about(service), [], [])
         elif line.samples is not None:
-            self._series[service, line.samples].samples.append(line.part())
+            self._series[service, line.samples][1].append(line.part())
         elif line.target is not None:
-            self._series[service, line.target].target.append(line.part())
+            self._series[service, line.target][2].append(line.part())
         elif line.message is not None:
             self.messages.append({"message": shown(line.message, 100), "sender": line.sender})
         elif line.way and not self.way:
@@ -142,30 +137,19 @@ def read(plan: Plan, logs: Path) -> JudgedRecord:
     """The records of a test's evaluators in the folder of its logs; what cannot be read is left out."""
     found = JudgedRecord()
     for service in plan.services:
+        path = logs / f"{service.layer}.{service.name}{JUDGED_SUFFIX}"
+        texts = []
         if service.judge:
-            lines = list(_lines(logs / f"{service.layer}.{service.name}{JUDGED_SUFFIX}"))
-            found.silent += [] if lines else [service.name]
-            for line in lines:
-                try:
-                    found.take(service.name, line)
-                except (ValueError, KeyError):
-                    continue
+            with contextlib.suppress(OSError):
+                texts = regular_file.content(path, _MOST_BYTES).splitlines()
+            found.silent += [] if texts else [service.name]
+        for text in texts:
+            with contextlib.suppress(ValueError, KeyError, RecursionError):
+                found.take(service.name, msgspec.json.decode(text, type=Line))
     return found
 
 
-def _lines(path: Path) -> Iterator[Line]:
-    try:
-        texts = regular_file.content(path, _MOST_BYTES).splitlines()
-    except OSError:
-        return
-    for text in texts:
-        try:
-            yield msgspec.json.decode(text, type=Line)
-        except (ValueError, RecursionError):
-            continue
-
-
-def _columns(parts: list[tuple[Values, Values, bytes]], begin: int) -> dict[str, Any]:
+def _columns(parts: _Parts, begin: int) -> dict[str, Any]:
     times = np.concatenate([np.empty(0), *(part[0] for part in parts)])
     values = np.concatenate([np.empty(0), *(part[1] for part in parts)])
     marks = np.frombuffer(b"".join(part[2] for part in parts), np.uint8)

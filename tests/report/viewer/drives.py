@@ -1,5 +1,6 @@
 """Drives of tests that failed, made without running them: a recording, logs, an outcome, and the test's real Plan."""
 
+import base64
 import functools
 import importlib
 import math
@@ -8,7 +9,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from dodo_dsl import compiler
 from dodo_dsl.emit.output_folder import FILES
@@ -56,6 +59,10 @@ def shipped(slug: str) -> Plan:
         patch.chdir(ROOT)
         made = compiler.plan(compiler.load([ROOT / "tests_registry" / slug.partition("--")[0]]), Path("generated"))
     return next(plan for plan in made.compiled.suite.plans if plan.slug == slug)
+
+
+def unpacked(text: str) -> NDArray[np.float32]:
+    return np.frombuffer(base64.b64decode(text, validate=True), "<f4")
 
 
 def write(report: Path, drives: Iterable[MadeDrive]) -> list[Outcome]:

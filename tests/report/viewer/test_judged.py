@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dodo_dsl.report.trajectory import Way, ground_of
-from dodo_dsl.report.viewer import encoded, page
+from dodo_dsl.report.viewer import page
 from dodo_dsl.report.viewer import recorded as recorded_test
 from dodo_dsl.report.viewer.record import JudgedRecord, read
 from dodo_dsl.report.viewer.units import title_of, unit_of
@@ -40,10 +40,10 @@ def test_a_series_with_its_limits_and_its_target(tmp_path: Path) -> None:
     (series,) = found.series(EPOCH)
     assert (series["name"], series["unit"], series["high"]) == ("Step", "deg", 3)
     assert series["note"] == "band ±0.1, at most 3 deg, distance at most 0.5 deg"
-    assert encoded.unpacked(series["times"]).tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
-    assert encoded.unpacked(series["values"]).tolist()[:4] == np.float32([1, 1.2, 2, 4]).tolist()
+    assert drives.unpacked(series["times"]).tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
+    assert drives.unpacked(series["values"]).tolist()[:4] == np.float32([1, 1.2, 2, 4]).tolist()
     assert series["marks"] == "AAECAgI="  # 0 1 2 2 2
-    assert encoded.unpacked(series["target"]["values"]).tolist() == [1.0] * 5
+    assert drives.unpacked(series["target"]["values"]).tolist() == [1.0] * 5
     assert found.parameters == {"track": {"largest-step": ("max-step",)}}
     assert (found.silent, found.why()) == ([], "")
 
@@ -57,7 +57,7 @@ def test_what_failed_is_among_the_samples_that_are_kept(tmp_path: Path) -> None:
             series.add(EPOCH + number * 1000, 0.0 if number == 41_001 else 1.0 + number % 7)
 
     (series,) = recorded(tmp_path, fill).series(EPOCH)
-    times, values = encoded.unpacked(series["times"]), encoded.unpacked(series["values"])
+    times, values = drives.unpacked(series["times"]), drives.unpacked(series["values"])
     assert recording.MOST_SAMPLES / 4 < len(times) <= recording.MOST_SAMPLES
     assert (values.min(), values.max(), times[values == 0].tolist()) == (0, 7, [np.float32(41.001)])
     assert (np.diff(times) > 0).all()
