@@ -5,8 +5,6 @@ ECMA-48, section 8.3.117 (SGR), in the terminal's own palette.
 """
 
 import argparse
-import contextlib
-import io
 import os
 from collections.abc import Iterable, Iterator
 from enum import IntEnum
@@ -82,17 +80,3 @@ def add_verbosity(parser: argparse.ArgumentParser, quiet: str, verbose: str) -> 
         (("-v", "--verbose"), Verbosity.VERBOSE, verbose),
     ):
         group.add_argument(*flags, dest="verbosity", action="store_const", const=value, help=text)
-
-
-@contextlib.contextmanager
-def chatter(stream: TextIO, verbosity: Verbosity) -> Iterator[TextIO]:
-    """A stream for what is not asked for with ``-q``; it is shown all the same when an error ends this."""
-    if verbosity is not Verbosity.QUIET:
-        yield stream
-        return
-    unsaid = io.StringIO()
-    try:
-        yield unsaid
-    except Exception:
-        stream.write(unsaid.getvalue())
-        raise

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TextIO, cast
 
 from dodo_dsl.cli import display, progress, run_report, selection
-from dodo_dsl.cli.display import Verbosity, chatter
+from dodo_dsl.cli.display import Verbosity
 from dodo_dsl.cli.errors import Exit, UsageError, of_outcomes
 from dodo_dsl.cli.loading import loading
 from dodo_dsl.cli.numbers import positive, seconds, seed, shard
@@ -129,7 +129,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to inspect it")
     display.add_verbosity(
         parser,
-        "print only what did not pass, and a last line with the counts",
+        "print only warnings, what did not pass, and a last line with the counts",
         "print each test's phases, sentence, checks, and what the application used",
     )
     selection.add_application(parser)
@@ -145,13 +145,12 @@ def _main(options: argparse.Namespace, stdout: TextIO) -> int:
     stdout = cast(TextIO, UninterruptedStream(stdout))
     reap_folders()
     with work_folder() as folder, loading(options) as server:
-        with chatter(stdout, options.verbosity) as quietly:
-            jobs, deployment = prepare(options, folder.path, quietly)
-            if not jobs:
-                quietly.write("no test is in this part of the tests\n")
-                return Exit.OK
-            _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
-            runner = runner_of(options, jobs, deployment, quietly, folder, server)
+        jobs, deployment = prepare(options, folder.path, stdout)
+        if not jobs:
+            stdout.write("no test is in this part of the tests\n")
+            return Exit.OK
+        _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
+        runner = runner_of(options, jobs, deployment, stdout, folder, server)
         gc.freeze()
         gc.enable()
         source, said = origin(options, deployment), options.verbosity
@@ -190,8 +189,9 @@ def runner_of(
     estimate = order.estimate(jobs)
     most = max(1, min(order.capacity // min(order.need(job) for job in jobs), len(jobs)))
     at_once = f"{'up to ' * (len(jobs) > 1)}{most} at a time"
-    stdout.write(f"{progress.count(len(jobs))}, {at_once}, {backend} backend")
-    stdout.write("\n" if estimate is None else f"; {progress.about(estimate)}\n")
+    if options.verbosity is not Verbosity.QUIET:
+        takes = "" if estimate is None else f"; {progress.about(estimate)}"
+        stdout.write(f"{progress.count(len(jobs))}, {at_once}, {backend} backend{takes}\n")
     shown = progress.choose(stdout, [p.slug for p in plans], options.verbosity)
     _require_possible(options, backend, plans)
     cids, nets, held = deployment.cids, subnets(deployment.subnets), (folder.lease.descriptor,)

@@ -6,13 +6,6 @@ dodo.header = (function () {
   const { choice, make, seconds } = dodo.dom;
   const { test, moment, files, spec } = dodo.data.test;
 
-  // What repeats the test; repetitions and copies of it have the same name but for their number.
-  function command() {
-    const name = test.name.replace(/(\[(run|report)=\d+\])+$/, "");
-    const word = /^[\w.\/-]+$/.test(name) ? name : `'${name.replaceAll("'", "'\\''")}'`;
-    return `dodo run ${word}${test.seed ? ` --seed ${test.seed}` : ""}`;
-  }
-
   function copier(name, text) {
     const button = make("button", { title: text }, name);
     const said = (word) => {
@@ -62,9 +55,8 @@ dodo.header = (function () {
     part("reason").textContent = test.title;
     part("reason").title = test.reason;
     part("files").append(...links());
-    part("actions").append(copier("Copy command", command()));
     if (dodo.data.test.duration > 0) transport(part("transport"));
   }
 
-  return { show, command };
+  return { show };
 })();

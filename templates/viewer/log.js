@@ -6,7 +6,7 @@ dodo.log = (function () {
   const { services, lines, left } = dodo.data.test.log;
   // What a choice hides: lines of the level "info" are those that DoDo's own services say in passing.
   const LEVELS = [["info", "Without DoDo's INFO"], ["", "All lines"], ["info,", "Warnings and errors"], ["info,,warning", "Errors"]];
-  const shown = { text: "", service: "", hidden: ["info"] };
+  const shown = { text: "", hidden: ["info"] };
   const times = Float32Array.from(lines.map(([time]) => time).filter((time) => time !== null));
   let rows = [];
   let current = -1;
@@ -18,7 +18,7 @@ dodo.log = (function () {
   }
 
   function isShown([, service, level, text]) {
-    return !shown.hidden.includes(level) && (!shown.service || services[service] === shown.service) && (!shown.text || text.toLowerCase().includes(shown.text));
+    return !shown.hidden.includes(level) && `${services[service]} ${text}`.toLowerCase().includes(shown.text);
   }
 
   function filter(list) {
@@ -39,19 +39,15 @@ dodo.log = (function () {
   }
 
   function controls(list) {
-    const search = make("input", { type: "search", placeholder: "Search", "aria-label": "Search the log" });
+    const search = make("input", { type: "search", placeholder: "Search lines and services", "aria-label": "Search the log" });
     search.addEventListener("input", () => ((shown.text = search.value.toLowerCase()), filter(list)));
-    const service = choice("Service", [["", "All services"], ...services.map((name) => [name, name])], (name) => {
-      shown.service = name;
-      filter(list);
-    });
     const hides = (value) => (value ? value.split(",") : []);
     const count = (value) => lines.filter(([, , level]) => !hides(value).includes(level)).length;
     const level = choice("Level", LEVELS.map(([value, name]) => [value, `${name} (${count(value)})`]), (value) => {
       shown.hidden = hides(value);
       filter(list);
     });
-    return [search, service, level];
+    return [search, level];
   }
 
   function show(parent) {

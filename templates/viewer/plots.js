@@ -193,12 +193,10 @@ dodo.plots = (function () {
     return signal.target ? `${value} · target ${withUnit(interpolated(signal.target, time), signal.unit)}` : value;
   }
 
-  function add(parent, signal, isRemovable) {
+  function add(parent, signal) {
     const value = make("output", {});
-    const drop = () => (charts.delete(one), one.u.destroy(), figure.remove());
-    const close = isRemovable && make("button", { class: "plain", title: "Remove this plot", onclick: drop }, "×");
     const plot = make("div", { class: "plot", role: "img", "aria-label": signal.title });
-    const figure = make("figure", {}, make("figcaption", {}, make("b", {}, signal.title), make("small", {}, signal.note || ""), value, close || ""), plot);
+    const figure = make("figure", {}, make("figcaption", {}, make("b", {}, signal.title), make("small", {}, signal.note || ""), value), plot);
     parent.append(figure);
     const read = (time) => (value.textContent = text(signal, time ?? cursor.time()));
     const one = chart(plot, signal, read);
@@ -217,7 +215,7 @@ dodo.plots = (function () {
     };
     for (const channel of others()) group(`${channel.message}/${channel.sender}`, channel.fields.map((field) => [field.name, () => plain(channel, field)]));
     select.addEventListener("change", () => {
-      if (select.value !== "") add(parent, choices[Number(select.value)](), true).scrollIntoView({ block: "nearest" });
+      if (select.value !== "") add(parent, choices[Number(select.value)]()).scrollIntoView({ block: "nearest" });
       select.value = "";
     });
     return choices.length ? select : "";
@@ -233,7 +231,7 @@ dodo.plots = (function () {
     parent.append(make("h2", {}, "Signals", chooser(plots), whole, pointed), plots, axis);
     if (data.test.why) plots.append(make("p", { class: "nothing" }, data.test.why));
     if (!list.length && !data.test.why) plots.append(make("p", { class: "nothing" }, "No signal that is judged was recorded."));
-    for (const signal of list) add(plots, signal, false);
+    for (const signal of list) add(plots, signal);
     const line = { isAxis: true, isPlain: true, times: [0, cursor.last], values: [null, null] };
     chart(axis, line, (time) => (pointed.textContent = time === null ? "" : `pointer at ${time.toFixed(2)} s`)).read = () => {};
     cursor.follow((time) => {

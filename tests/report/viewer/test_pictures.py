@@ -30,13 +30,6 @@ def test_frames_keep_their_times_and_content(tmp_path: Path) -> None:
     assert [frame.to_ndarray(format="gray").mean() for frame in frames] == pytest.approx(np.arange(16) * 10, abs=8)
 
 
-def test_the_oldest_frames_go_where_there_are_too_many(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    samples = list(failures.pictures(1.5))
-    monkeypatch.setattr(pictures, "MOST_BYTES", sum(len(fields["data"]) for *_, fields in samples[8:]))
-    (video,) = written(tmp_path, samples)
-    assert video.times[0] == 1.0
-
-
 @pytest.mark.parametrize(
     ("fields", "problem"),
     [
