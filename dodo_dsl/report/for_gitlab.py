@@ -14,7 +14,8 @@ from typing import Any
 
 from dodo_dsl.outcome import NotRun, Outcome, worst_margin
 from dodo_dsl.report import checks
-from dodo_dsl.report.results import RunRecord
+from dodo_dsl.report.overview import LinkedFiles
+from dodo_dsl.report.results import Circumstances
 from dodo_dsl.report.viewer import moment
 from dodo_dsl.terminal import printable
 
@@ -25,24 +26,20 @@ _ATTACHMENT = "[[ATTACHMENT|"
 
 
 def junit(
-    outcomes: Sequence[Outcome],
-    attachments: Mapping[str, str],
-    links: Mapping[str, str],
-    not_run: Sequence[NotRun] = (),
-    runs: Sequence[RunRecord] = (),
+    outcomes: Sequence[Outcome], files: Mapping[str, LinkedFiles], folder: str, circumstances: Circumstances
 ) -> bytes:
-    """``junit.xml``; ``attachments`` and ``links`` are pictures and pages by slug, from the working folder.
+    """``junit.xml``; ``folder`` is that of the report and its files, from the working folder.
 
-    Tests that were ``not_run`` are skipped ones; date and host are those of the run, if it is one of ``runs`` alone.
+    Tests that were not run are skipped ones; date and host are those of the run, if it is one alone.
     """
     from junitparser import JUnitXml, Skipped, TestSuite
 
     suite = TestSuite("dodo")
-    if len(runs) == 1:
-        suite.timestamp = runs[0].date.partition("+")[0]
-        suite.hostname = xml_text(runs[0].host)
-    cases = [_case(outcome, attachments.get(outcome.slug), links.get(outcome.slug)) for outcome in outcomes]
-    for test in not_run:
+    if len(circumstances.runs) == 1:
+        suite.timestamp = circumstances.runs[0].date.partition("+")[0]
+        suite.hostname = xml_text(circumstances.runs[0].host)
+    cases = [_case(outcome, files[outcome.slug], folder) for outcome in outcomes]
+    for test in circumstances.not_run:
         cases.append(_named(test))
         cases[-1].result = [Skipped(xml_text(f"not run: {test.reason}"))]
     suite.add_testcases(cases)  # one by one, each is counted with all before it
@@ -61,19 +58,24 @@ def _named(test: Outcome | NotRun) -> Any:
     return case
 
 
-def _case(outcome: Outcome, attachment: str | None, link: str | None) -> Any:
+def _case(outcome: Outcome, files: LinkedFiles, folder: str) -> Any:
+    """A test; in a job of GitLab, where the working folder is the job's, links lead to the job's artifacts."""
     from junitparser import Error, Failure
+
+    job, decisive = os.environ.get("CI_JOB_URL", ""), moment.decisive(outcome, 0.0)
+    place = f"{job}/artifacts/file/{folder}" if job.startswith(("http://", "https://")) else folder
+    at = "" if decisive.what == moment.END else f"#t={decisive.time:.2f}"
 
     case = _named(outcome)
     case.time = round(outcome.execution_s or 0.0, 3)
     if outcome.outcome != "passed":
         result = (Failure if outcome.outcome == "failed" else Error)(_plain(outcome.reason), outcome.outcome)
-        replay = [f"replay: {link}"] if link else []
+        replay = [f"replay: {place}/{files.drive}{at}"] if files.drive else []
         result.text = _plain("\n".join([outcome.reason, *replay, *outcome.last_lines]))
         case.result = [result]
     # GitLab shows the text of a failure in place of this, and takes the attachment from here
     lines = [_plain(line) for line in [*checks.lines(outcome), *(f"note: {note}" for note in outcome.notes)]]
-    lines += [xml_text(f"{_ATTACHMENT}{attachment}]]")] if attachment else []
+    lines += [xml_text(f"{_ATTACHMENT}{folder}/{path}]]") for path, _ in files.pictures[:1]]
     if lines:
         case.system_out = "\n".join(lines)
     return case
@@ -138,19 +140,3 @@ def _samples(outcome: Outcome) -> Iterator[tuple[str, float | None, dict[str, st
 
 def _number(value: float) -> str:
     return repr(value) if math.isfinite(value) else {math.inf: "+Inf", -math.inf: "-Inf"}.get(value, "NaN")
-
-
-def to_moments(outcomes: Sequence[Outcome], pages: Mapping[str, str], folder: str) -> dict[str, str]:
-    """The page of each test at the moment that decided, if the verdict has it.
-
-    ``pages`` are paths in the report by slug, ``folder`` the report as seen from the working folder. In a job of GitLab
-    that is the job's folder, and links lead to the job's artifacts.
-    """
-    job = os.environ.get("CI_JOB_URL", "")
-    place = f"{job}/artifacts/file/{folder}" if job.startswith(("http://", "https://")) else folder
-    return {o.slug: f"{place}/{pages[o.slug]}{_fragment(o)}" for o in outcomes if o.slug in pages}
-
-
-def _fragment(outcome: Outcome) -> str:
-    decisive = moment.decisive(outcome, 0.0)
-    return "" if decisive.what == moment.END else f"#t={decisive.time:.2f}"

@@ -46,16 +46,11 @@ def write_summaries(
     atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes, circumstances))
     atomic.write_text(folder / "metrics.txt", for_gitlab.metrics_text(outcomes))
     files = {o.slug: _files(folder, o) for o in outcomes}
-    pages = {slug: found.drive for slug, found in files.items() if found.drive}
-    if pages:
+    if any(found.drive for found in files.values()):
         from dodo_dsl.report.viewer import page
 
         page.write_shared(folder)
-    shown = _shown(folder)
-    attachments = {slug: f"{shown}/{found.pictures[0][0]}" for slug, found in files.items() if found.pictures}
-    moments = for_gitlab.to_moments(outcomes, pages, shown)
-    junit = for_gitlab.junit(outcomes, attachments, moments, circumstances.not_run, circumstances.runs)
-    atomic.write_bytes(folder / "junit.xml", junit)
+    atomic.write_bytes(folder / "junit.xml", for_gitlab.junit(outcomes, files, _shown(folder), circumstances))
     html = overview.render(outcomes, files, comparison, circumstances, past)
     atomic.write_text(folder / "index.html", html)
 

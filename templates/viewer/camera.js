@@ -4,7 +4,7 @@
 dodo.camera = (function () {
   const { test, at, channels, field, frames, frameAt, kinds } = dodo.data;
   const { choice, make, svg } = dodo.dom;
-  const videos = test.videos.filter((each) => each.file).map((each) => ({ ...each, times: Float32Array.from(each.times) }));
+  const videos = test.videos.map((each) => ({ ...each, times: Float32Array.from(each.times) }));
   const TEXTS = { hit: (each) => each.score.toFixed(2), false: (each) => `false ${each.label}`, missed: (each) => `missed ${each.label}` };
   const SAME = 1e-3;
   const WIDE = 640;
@@ -48,11 +48,7 @@ dodo.camera = (function () {
     return video && n < 0 ? `${found}; it was not recorded` : found;
   }
 
-  function why() {
-    const problem = test.videos.map((each) => each.problem).find(Boolean);
-    return problem || (videos.length ? "" : "The frames of a test that passed are not kept; record: {frames: always} in the test keeps them.");
-  }
-
+  const why = "No frames in H.264 were recorded; record: {frames: always} in the test keeps those of a test that passed.";
   const isNeeded = () => videos.length > 0 || frames.length > 0;
 
   function show(parent) {
@@ -69,7 +65,7 @@ dodo.camera = (function () {
     const shown = make("div", { class: "screen" }, video ? screen : "", over);
     shown.style.aspectRatio = `${WIDE} / ${high}`;
     shown.style.setProperty("--ratio", WIDE / high);
-    parent.append(make("div", { class: "view" }, make("div", { class: "stage" }, shown), make("p", { class: "caption" }, why()), text, chooser));
+    parent.append(make("div", { class: "view" }, make("div", { class: "stage" }, shown), make("p", { class: "caption" }, videos.length ? "" : why), text, chooser));
     parent.classList.add("pictured");
     const seek = (time) => {
       const n = pictured(time);

@@ -30,7 +30,7 @@ from dodo_dsl.report.files import DATA, LOGS, PAGE, SHARED, TRAJECTORY
 from dodo_dsl.report.trajectory import Ground, Way, colour_of, ground_of
 from dodo_dsl.report.viewer import log_lines, moment, pictures, recorded
 from dodo_dsl.report.viewer.encoded import packed, script, shown
-from dodo_dsl.report.viewer.pictures import Replayed, Video
+from dodo_dsl.report.viewer.pictures import Replayed
 from dodo_dsl.report.viewer.record import read
 from dodo_dsl.report.viewer.recorded import FRAME, Channel, RecordedTest
 from dodo_dsl.report.viewer.units import title_of, unit_of
@@ -136,7 +136,7 @@ def write(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> None:
         trajectory.draw(folder / TRAJECTORY, ground, way, path, outcome.outcome)
     decisive = moment.decisive(outcome, test.duration)
     videos = list(pictures.write(folder, list(_replayed(plan, compiled)), test, messages))
-    for video in [each for each in videos if isinstance(each, Video)][:1]:
+    for video in videos[:1]:
         pictures.write_frame(folder, video, decisive.time)
     if outcome.level != "hil":
         pictures.shrink_snapshot(folder)
@@ -152,7 +152,7 @@ def write(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> None:
         "log": log_lines.merged(folder / LOGS, test),
         "channels": [_channel(channel) for channel in test.channels],
         "frames": record.frames(test.begin),
-        "videos": [{"problem": each} if isinstance(each, str) else dataclasses.asdict(each) for each in videos],
+        "videos": [dataclasses.asdict(video) for video in videos],
         "judged": record.series(test.begin),
         "messages": record.messages,
         "why": record.why() if test.channels else "",

@@ -24,10 +24,6 @@ _WIDTH, _SAME = 320, 1e-3
 _START, _IDR, _SET = b"\x00\x00\x01", 5, 7
 
 
-class NoVideo(ValueError):
-    """Why there is no video of a camera, in a sentence."""
-
-
 @dataclass(frozen=True)
 class Video:
     """A camera's video: the file next to the page, the size in pixels, and the time of each frame in s of the test."""
@@ -52,10 +48,8 @@ Images = list[tuple[int, Any]]
 """Sample times in us and messages of one camera, each later than the one before."""
 
 
-def write(
-    folder: Path, replayed: Sequence[Replayed], test: RecordedTest, messages: MessageSet
-) -> Iterator[Video | str]:
-    """A video in ``folder`` of each camera in a test's recordings, a few at most, or a sentence on why not.
+def write(folder: Path, replayed: Sequence[Replayed], test: RecordedTest, messages: MessageSet) -> Iterator[Video]:
+    """A video in ``folder`` of each camera in a test's recordings, a few at most, as far as they are H.264.
 
     Of a test that recorded none, they are those that it ``replayed``.
     """
@@ -64,25 +58,23 @@ def write(
     ]
     cameras = (cameras or [found for each in replayed if (found := _played(each, test, messages))])[: len(VIDEOS)]
     for images, name in zip(cameras, VIDEOS, strict=False):
-        try:
-            yield _write(folder / name, images, test.begin, MOST_BYTES // len(cameras))
-        except NoVideo as problem:
-            yield str(problem)
+        if video := _write(folder / name, images, test.begin, MOST_BYTES // len(cameras)):
+            yield video
 
 
-def _write(target: Path, images: Images, begin: int, most_bytes: int) -> Video:
+def _write(target: Path, images: Images, begin: int, most_bytes: int) -> Video | None:
+    import av
+
     kept = _kept(images, most_bytes)
-    if not kept:
-        raise NoVideo("none of the recorded frames stands alone, so none can be shown")
-    first = kept[0][1]
-    if first.format not in _FORMATS:
-        raise NoVideo(f"recorded frames of format '{first.format[:40]}' are not shown, expected h264")
-    if problem := too_large(first.width, first.height):
-        raise NoVideo(f"the recorded frames are not shown: {problem}")
-    with atomic.replacing(target) as part:
-        _mux(part, [(time, image.data) for time, image in kept])
-    times = [round((time - begin) / MICROSECONDS, 4) for time, _ in kept]
-    return Video(target.name, first.width, first.height, times)
+    first = kept[0][1] if kept else None
+    if first is None or first.format not in _FORMATS or too_large(first.width, first.height):
+        return None
+    with contextlib.suppress(av.FFmpegError):
+        with atomic.replacing(target) as part:
+            _mux(part, [(time, image.data) for time, image in kept])
+        times = [round((time - begin) / MICROSECONDS, 4) for time, _ in kept]
+        return Video(target.name, first.width, first.height, times)
+    return None
 
 
 def _cameras(recording: Path, messages: MessageSet) -> tuple[int, dict[int, Images]]:
@@ -165,21 +157,18 @@ def _stands_alone(packet: bytes) -> bool:
 
 
 def _mux(path: Path, packets: Sequence[tuple[int, bytes]]) -> None:
-    """An MP4 of H.264 packets, its first frame at 0 s; raises NoVideo."""
+    """An MP4 of H.264 packets, its first frame at 0 s; raises FFmpegError."""
     import av
 
     begin = packets[0][0]
-    try:
-        with (
-            av.open(io.BytesIO(packets[0][1]), format="h264") as source,
-            av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"}) as container,
-        ):
-            stream = container.add_stream_from_template(source.streams.video[0])
-            for time, data in packets:
-                packet = av.Packet(data)
-                packet.stream, packet.time_base = stream, Fraction(1, 10_000)
-                packet.pts = packet.dts = (time - begin) // 100
-                packet.is_keyframe = _stands_alone(data)
-                container.mux(packet)
-    except av.FFmpegError as error:
-        raise NoVideo(f"the recorded frames are not shown: {error}") from None
+    with (
+        av.open(io.BytesIO(packets[0][1]), format="h264") as source,
+        av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"}) as container,
+    ):
+        stream = container.add_stream_from_template(source.streams.video[0])
+        for time, data in packets:
+            packet = av.Packet(data)
+            packet.stream, packet.time_base = stream, Fraction(1, 10_000)
+            packet.pts = packet.dts = (time - begin) // 100
+            packet.is_keyframe = _stands_alone(data)
+            container.mux(packet)

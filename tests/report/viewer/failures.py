@@ -62,13 +62,6 @@ def crash() -> MadeDrive:
     )
 
 
-def no_answer() -> MadeDrive:
-    reason = "the application did not answer frame 17 within 2 s (no opendlv.proxy.GroundSteeringRequest)"
-    samples = [*poses(lambda t: (0.0, 0.5 * t, math.pi / 2), 1.7), *requests(lambda t: 0.0, 1.6)]
-    lines = [(t / 10, f"frame {t}: steering 0.000 rad") for t in range(17)]
-    return MadeDrive("sil-closed-straight", 1.7, samples, {"reason": reason}, {"application.steering": lines})
-
-
 def boxes(time: float, sender: int, found: list[Box]) -> Iterator[Sample]:
     for number, (label, x, y) in enumerate(found):
         known = {"sampleId": round(time * 10), "detectionId": number}
@@ -119,11 +112,6 @@ def false_detections() -> MadeDrive:
     checks = (check("precision", 0.91, False, min=0.95),)
     outcome = {"reason": reason, "kind": "perception", "checks": checks, "verdicts": (said,)}
     return MadeDrive("sil-perception--light-0-45--clutter-0", 1.5, samples, outcome)
-
-
-def interrupted() -> MadeDrive:
-    samples = [*poses(lambda t: (0.0, 0.5 * t, math.pi / 2), 0.9), *requests(lambda t: 0.0, 0.9)]
-    return MadeDrive("sil-closed-straight", 0.9, samples, {"reason": "the run was interrupted", "outcome": "error"})
 
 
 def rig_refused() -> MadeDrive:

@@ -23,10 +23,8 @@ DRIVES = {
     "wrong signal": (failures.wrong_signal(), 2.4),
     "missed cones": (failures.missed_cones(), 0.7),
     "crash": (failures.crash(), 2.3),
-    "no answer": (failures.no_answer(), 1.7),
     "set-up": (failures.set_up_failed(), 0.0),
     "false detections": (failures.false_detections(), 1.2),
-    "interrupted": (failures.interrupted(), 0.9),
     "rig refusal": (failures.rig_refused(), 0.0),
 }
 NAMES = list(DRIVES)

@@ -31,17 +31,16 @@ def test_frames_keep_their_times_and_content(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("fields", "problem"),
+    "fields",
     [
-        ({"format": "VP80", "data": b"\x00\x00\x01\x65"}, "recorded frames of format 'VP80' are not shown"),
-        ({"format": "h264", "data": b"garbage"}, "none of the recorded frames stands alone"),
-        ({"format": "h264", "width": 60_000, "height": 60_000, "data": b"\x00\x00\x01\x65"}, "are not shown"),
-        ({"format": "h264", "width": 16, "height": 16, "data": b"\x00\x00\x01\x65garbage"}, "are not shown"),
+        {"format": "VP80", "data": b"\x00\x00\x01\x65"},
+        {"format": "h264", "data": b"garbage"},
+        {"format": "h264", "width": 60_000, "height": 60_000, "data": b"\x00\x00\x01\x65"},
+        {"format": "h264", "width": 16, "height": 16, "data": b"\x00\x00\x01\x65garbage"},
     ],
 )
-def test_what_is_no_video_is_said(tmp_path: Path, fields: dict[str, Any], problem: str) -> None:
-    (said,) = written(tmp_path, [(0.1, "opendlv.proxy.ImageReading", 0, fields)])
-    assert problem in said
+def test_what_is_no_video_is_left_out(tmp_path: Path, fields: dict[str, Any]) -> None:
+    assert written(tmp_path, [(0.1, "opendlv.proxy.ImageReading", 0, fields)]) == []
     assert [path.name for path in tmp_path.iterdir()] == ["test.rec"]
 
 
@@ -52,6 +51,6 @@ def test_a_recording_that_was_played_shows_its_frames_when_the_test_announced_th
     test = recorded.read(tmp_path / "test.rec", MESSAGES)
     played = pictures.Replayed(tmp_path / "played.rec", 0, 1.0, float("inf"))
     (video,) = pictures.write(tmp_path, [played], test, MESSAGES)
-    assert isinstance(video, Video) and video.times == pytest.approx([2 + n / 5 for n in range(6)])
+    assert video.times == pytest.approx([2 + n / 5 for n in range(6)])
     pictures.write_frame(tmp_path, video, 3.05)
     assert cv2.imread(str(tmp_path / "frame.jpg")).mean() == pytest.approx(150, abs=8)
