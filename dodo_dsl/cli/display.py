@@ -4,7 +4,6 @@ Colours are shown on a terminal, or where FORCE_COLOR asks for them, and never w
 ECMA-48, section 8.3.117 (SGR), in the terminal's own palette.
 """
 
-import argparse
 import os
 from collections.abc import Iterable, Iterator
 from enum import IntEnum
@@ -69,14 +68,3 @@ class Verbosity(IntEnum):
     QUIET = -1
     NORMAL = 0
     VERBOSE = 1
-
-
-def add_verbosity(parser: argparse.ArgumentParser, quiet: str, verbose: str) -> None:
-    """Adds ``-q`` and ``-v``, with their help."""
-    group = parser.add_mutually_exclusive_group()
-    parser.set_defaults(verbosity=Verbosity.NORMAL)
-    for flags, value, text in (
-        (("-q", "--quiet"), Verbosity.QUIET, quiet),
-        (("-v", "--verbose"), Verbosity.VERBOSE, verbose),
-    ):
-        group.add_argument(*flags, dest="verbosity", action="store_const", const=value, help=text)

@@ -1,10 +1,9 @@
 """dodo report: draw reports again, join them into one, and show what changed."""
 
 import argparse
-import contextlib
 import os
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
@@ -43,7 +42,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     other = read_given(options.against) if options.against else None
-    with _child_reports(options.gitlab, stdout) as fetched:
+    with tempfile.TemporaryDirectory() as folder:
+        fetched = _child_reports(Path(folder), stdout) if options.gitlab else []
         folders = options.folder if options.folder or fetched else [REPORT]
         output = options.output or (REPORT if options.gitlab else None)
         reports = [*map(read_given, folders), *fetched]
@@ -57,20 +57,15 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     return of_outcomes(outcome.outcome for outcome in outcomes) if comparison else Exit.OK
 
 
-@contextlib.contextmanager
-def _child_reports(is_job: bool, stdout: TextIO) -> Iterator[list[GivenReport]]:
-    """The reports of child pipelines in a folder that lasts as long as this."""
-    if not is_job:
-        yield []
-        return
+def _child_reports(folder: Path, stdout: TextIO) -> list[GivenReport]:
+    """The reports of the child pipelines of this job's, kept in ``folder``."""
     from dodo_dsl.report import child_jobs
 
-    with tempfile.TemporaryDirectory() as folder:
-        reports, sentences = child_jobs.fetch(child_jobs.of_job(os.environ), Path(folder))
-        stdout.writelines(f"{printable(sentence)}\n" for sentence in sentences)
-        if not reports:
-            raise UsageError("no job of a child pipeline has a report")
-        yield reports
+    reports, sentences = child_jobs.fetch(child_jobs.of_job(os.environ), folder)
+    stdout.writelines(f"{printable(sentence)}\n" for sentence in sentences)
+    if not reports:
+        raise UsageError("no job of a child pipeline has a report")
+    return reports
 
 
 def _drawn(reports: Sequence[GivenReport], out: Path | None, stdout: TextIO) -> tuple[Path, Sequence[Outcome]]:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TextIO, cast
 
-from dodo_dsl.cli import display, progress, run_report, selection
+from dodo_dsl.cli import progress, run_report, selection
 from dodo_dsl.cli.display import Verbosity
 from dodo_dsl.cli.errors import Exit, UsageError, of_outcomes
 from dodo_dsl.cli.loading import loading
@@ -127,11 +127,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--compiled", type=Path, action="append", default=[], metavar="DIR/SLUG",
                         help="folder of a compiled test; repeatable")  # fmt: skip
     parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to inspect it")
-    display.add_verbosity(
-        parser,
-        "print only warnings, what did not pass, and a last line with the counts",
-        "print each test's phases, sentence, checks, and what the application used",
-    )
+    parser.set_defaults(verbosity=Verbosity.NORMAL)
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument("-q", "--quiet", dest="verbosity", action="store_const", const=Verbosity.QUIET,
+                       help="print only warnings, what did not pass, and a last line with the counts")  # fmt: skip
+    group.add_argument("-v", "--verbose", dest="verbosity", action="store_const", const=Verbosity.VERBOSE,
+                       help="print each test's phases, sentence, checks, and what the application used")  # fmt: skip
     selection.add_application(parser)
 
 

@@ -42,7 +42,6 @@ class UninterruptedStream:
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
-        self._broken = False
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
@@ -54,25 +53,23 @@ class UninterruptedStream:
 
     def write(self, text: str) -> int:
         try:
-            return 0 if self._broken else self._stream.write(text)
+            return self._stream.write(text)
         except OSError:
-            return self._give_up()
+            self._give_up()
+            return 0
 
     def writelines(self, lines: Iterable[str]) -> None:
         self.write("".join(lines))
 
     def flush(self) -> None:
         try:
-            if not self._broken:
-                self._stream.flush()
+            self._stream.flush()
         except OSError:
             self._give_up()
 
-    def _give_up(self) -> int:
-        self._broken = True
+    def _give_up(self) -> None:
         with contextlib.suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
-        return 0
 
 
 def stop_like_interrupt(_number: int, _frame: object) -> None:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from markupsafe import Markup
 
@@ -210,22 +210,10 @@ _ONE, _TWO = {"min": 50, "max": 50}, {"min": 25, "max": 75}
 _LEAST = 2
 
 
-class BarPlace(NamedTuple):
-    """The parts of a bar that is 100 wide, on which values grow to the right.
+def bar_place(check: Check) -> tuple[int, int, int, int, bool] | None:
+    """The bar from a check's nearest limit to its value, None without both, on a scale of 100 that grows to the right.
 
-    From ``first`` to ``last`` values are allowed; the bar begins at ``left``.
-    """
-
-    first: int
-    last: int
-    left: int
-    width: int
-    ok: bool
-
-
-def bar_place(check: Check) -> BarPlace | None:
-    """The bar from a check's nearest limit to its value, None without both.
-
+    Its parts: from where to where values are allowed, where the bar begins, its width, and whether the check holds.
     Beyond a limit, ``margin_share`` is the length, so that every value finds room.
     """
     check = with_margins(check)
@@ -238,7 +226,7 @@ def bar_place(check: Check) -> BarPlace | None:
     reached = 0.0 if not check["ok"] and (check["margin"] or 0.0) >= 0 else length  # a wall that is touched
     end = round(room * reached) * (1 if near == "min" else -1)
     first, last = at["min"] if "min" in limit else 0, at["max"] if "max" in limit else 100
-    return BarPlace(first, last, min(at[near], at[near] + end), max(abs(end), _LEAST), check["ok"])
+    return first, last, min(at[near], at[near] + end), max(abs(end), _LEAST), check["ok"]
 
 
 def bar(check: Check) -> Markup:
@@ -246,8 +234,9 @@ def bar(check: Check) -> Markup:
     found = bar_place(check)
     if found is None:
         return Markup()
-    edges = "".join(f"<rect class=edge x={at}% />" for at in (found.first, found.last) if 0 < at < 100)
+    first, last, left, width, is_ok = found
+    edges = "".join(f"<rect class=edge x={at}% />" for at in (first, last) if 0 < at < 100)
     return Markup(  # noqa: S704  (numbers)
-        f"<svg class=bar><rect class=room x={found.first}% width={found.last - found.first}% />"
-        f"<rect class={'ok' if found.ok else 'no'} x={found.left}% width={found.width}% />{edges}</svg>"
+        f"<svg class=bar><rect class=room x={first}% width={last - first}% />"
+        f"<rect class={'ok' if is_ok else 'no'} x={left}% width={width}% />{edges}</svg>"
     )

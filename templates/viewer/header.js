@@ -6,23 +6,12 @@ dodo.header = (function () {
   const { choice, make, seconds } = dodo.dom;
   const { test, moment, files, spec } = dodo.data.test;
 
-  function copier(name, text) {
-    const button = make("button", { title: text }, name);
-    const said = (word) => {
-      button.textContent = word;
-      setTimeout(() => (button.textContent = name), 1500);
-    };
-    const copy = async () => navigator.clipboard.writeText(text);
-    button.addEventListener("click", () => copy().then(() => said("Copied"), () => window.prompt("The command", text)));
-    return button;
-  }
-
   function links() {
     const found = files.filter((file) => /^[a-z]+\.rec$/.test(file)).map((file) => make("a", { href: file, download: file }, file));
     if (dodo.data.test.log.lines.length) found.push(make("a", { href: "logs/" }, "logs"));
     if (spec) found.push(make("a", { href: URL.createObjectURL(new Blob([spec], { type: "text/plain;charset=utf-8" })), target: "_blank", title: test.spec }, "spec"));
     const mcap = `dodo rec export ${test.slug}/test.rec --mcap -o ${test.slug}.mcap`;
-    return files.includes("test.rec") ? [...found, copier("Copy MCAP command", mcap)] : found;
+    return files.includes("test.rec") ? [...found, make("button", { title: mcap, onclick: () => window.prompt("The recording for Foxglove", mcap) }, "MCAP command")] : found;
   }
 
   function transport(parent) {

@@ -5,7 +5,7 @@ dodo.log = (function () {
   const { choice, make } = dodo.dom;
   const { services, lines, left } = dodo.data.test.log;
   // What a choice hides: lines of the level "info" are those that DoDo's own services say in passing.
-  const LEVELS = [["info", "Without DoDo's INFO"], ["", "All lines"], ["info,", "Warnings and errors"], ["info,,warning", "Errors"]];
+  const LEVELS = [["Without DoDo's INFO", ["info"]], ["All lines", []], ["Warnings and errors", ["info", ""]], ["Errors", ["info", "", "warning"]]];
   const shown = { text: "", hidden: ["info"] };
   const times = Float32Array.from(lines.map(([time]) => time).filter((time) => time !== null));
   let rows = [];
@@ -41,10 +41,9 @@ dodo.log = (function () {
   function controls(list) {
     const search = make("input", { type: "search", placeholder: "Search lines and services", "aria-label": "Search the log" });
     search.addEventListener("input", () => ((shown.text = search.value.toLowerCase()), filter(list)));
-    const hides = (value) => (value ? value.split(",") : []);
-    const count = (value) => lines.filter(([, , level]) => !hides(value).includes(level)).length;
-    const level = choice("Level", LEVELS.map(([value, name]) => [value, `${name} (${count(value)})`]), (value) => {
-      shown.hidden = hides(value);
+    const count = (hidden) => lines.filter(([, , level]) => !hidden.includes(level)).length;
+    const level = choice("Level", LEVELS.map(([name, hidden], n) => [n, `${name} (${count(hidden)})`]), (n) => {
+      shown.hidden = LEVELS[n][1];
       filter(list);
     });
     return [search, level];
