@@ -7,7 +7,7 @@ sections.
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 from dodo_dsl.outcome import Outcome, differs_each_run, numbered
 from dodo_dsl.report import checks
@@ -21,7 +21,6 @@ Direction = Literal["worse", "better", "different", "unchanged"]
 """``different`` is a change of a value that has no limit, or whose limits say nothing of the direction."""
 KINDS = ("newly failing", "still failing", "new", "gone", "fixed", "still passing")
 """Of tests, the most urgent first."""
-_SHOWN = (*KINDS[:-1], "worse", "better", "different")
 
 
 class Change(NamedTuple):
@@ -39,8 +38,6 @@ class Comparison:
     other: str
     kinds: Mapping[str, str]
     """Of ``KINDS``, by the slugs of the newer report's tests."""
-    counts: Mapping[str, int]
-    """How many tests of each kind there are."""
     sections: Mapping[str, Sequence[Change]]
     """What to show, the most urgent first, by the kind of change: tests, then checks."""
     unchanged: int
@@ -48,14 +45,15 @@ class Comparison:
 
     def in_words(self) -> str:
         """``2 newly failing, 14 still passing``"""
-        return ", ".join(f"{self.counts[kind]} {kind}" for kind in KINDS if self.counts[kind]) or "no tests"
+        counts = Counter(self.kinds.values())
+        return ", ".join(f"{counts[kind]} {kind}" for kind in KINDS if counts[kind]) or "no tests"
 
 
 def compare(outcomes: Sequence[Outcome], other: GivenReport) -> Comparison:
     """Tests are the same where their slugs are; those that are gone come last."""
     old = {test.outcome.slug: test.outcome for test in distinct([other])}
     new = {outcome.slug: outcome for outcome in outcomes}
-    found: dict[str, list[Change]] = {title: [] for title in (*KINDS, *_SHOWN, "unchanged")}
+    found: dict[str, list[Change]] = {title: [] for title in (*KINDS, *get_args(Direction))}
     kinds = dict[str, str]()
     for slug in dict.fromkeys([*new, *old]):
         before, after = old.get(slug), new.get(slug)
@@ -69,8 +67,8 @@ def compare(outcomes: Sequence[Outcome], other: GivenReport) -> Comparison:
             for key in (key for key in now if key in was):
                 words = f"{key[0]}: {_values(was[key], now[key])}"
                 found[direction(was[key], now[key])].append(Change(slug, latest.name, words))
-    sections = {title: found[title] for title in _SHOWN if found[title]}
-    return Comparison(str(other.file), kinds, Counter(kinds.values()), sections, len(found["unchanged"]))
+    unchanged, _ = found.pop("unchanged"), found.pop("still passing")
+    return Comparison(str(other.file), kinds, {title: each for title, each in found.items() if each}, len(unchanged))
 
 
 def _kind(before: Outcome | None, after: Outcome | None) -> str:

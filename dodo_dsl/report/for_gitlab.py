@@ -6,7 +6,6 @@ compares between branches.
 
 import io
 import json
-import math
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -117,7 +116,7 @@ def metrics_text(outcomes: Sequence[Outcome]) -> str:
     lines = list[str]()
     for name, samples in found.items():
         lines += [f"# HELP {name} {_METRICS[name]}", f"# TYPE {name} gauge"]
-        lines += [f"{name}{{{labels}}} {_number(value)}" for labels, value in samples.items()]
+        lines += [f"{name}{{{labels}}} {value!r}" for labels, value in samples.items()]
     return "\n".join([*lines, "# EOF\n"])
 
 
@@ -136,7 +135,3 @@ def _samples(outcome: Outcome) -> Iterator[tuple[str, float | None, dict[str, st
         labels = {**test, "check": check["name"], "unit": check.get("unit") or ""}
         yield "dodo_check_value", check["value"], labels
         yield "dodo_check_margin", check.get("margin"), labels
-
-
-def _number(value: float) -> str:
-    return repr(value) if math.isfinite(value) else {math.inf: "+Inf", -math.inf: "-Inf"}.get(value, "NaN")

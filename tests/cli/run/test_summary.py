@@ -50,7 +50,7 @@ def test_repetitions_have_a_rate_and_skipped_tests_are_named() -> None:
 def test_verbose_shows_checks_and_use(tmp_path: Path) -> None:
     passed = replace(PASSED, checks=({"name": "gap", "value": 0.5, "limit": {"min": 0.1}, "unit": "m", "ok": True},))
     passed = replace(passed, resources=(ServiceUse("steering", 1.5, 0.25, 150_000_000),))
-    stream, reported = StringIO(), Reported(plan(), tmp_path, Path("dodo-report/ok"))
+    stream, reported = StringIO(), Reported(plan(), tmp_path)
     run_report.write_summary(stream, [passed], [], Verbosity.VERBOSE, {"ok": reported})
     used = "1.50 s of processor time (25 % of a processor), up to 150 MB of memory"
     assert stream.getvalue().splitlines()[2:-2] == [
@@ -79,7 +79,9 @@ def test_rows_are_whole_and_have_the_decisive_check() -> None:
 
 def test_a_failure_says_what_where_and_which_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NO_COLOR", "1")
-    (tmp_path / "drive.html").touch()
+    monkeypatch.chdir(tmp_path)
+    Path("dodo-report/test").mkdir(parents=True)
+    Path("dodo-report/test/drive.html").touch()
     places = {"evaluation.track": Place("a/b.dodo.yml", 7, 3), "evaluation.track.min-gap": Place("a/b.dodo.yml", 8, 9)}
     judge = PlannedService("evaluation", "track", "x", "x", (), (Flag("min-gap", "1"),), judge=True)
     tested = replace(plan(), services=(judge,), source_map=places)
@@ -87,8 +89,8 @@ def test_a_failure_says_what_where_and_which_page(tmp_path: Path, monkeypatch: p
     verdict = {"evaluator": "track", "outcome": "failed", "reason": "hit"}
     failed = replace(OUTCOME, checks=(gap, {**GAP, "name": "held"}), reason="hit wall left " * 5, verdicts=(verdict,))
     error = replace(OUTCOME, slug="e", outcome="error", reason="service 'track' ended with exit code 2")
-    stream, reported = Terminal(), Reported(tested, tmp_path, Path("dodo-report/test"))
-    about = {"test": reported, "e": replace(reported, folder=tmp_path / "e", shown=Path("dodo-report/e"))}
+    stream, reported = Terminal(), Reported(tested, Path("dodo-report/test"))
+    about = {"test": reported, "e": replace(reported, folder=Path("dodo-report/e"))}
     run_report.write_summary(stream, [error, failed, replace(failed, checks=())], [], reported=about)
     assert stream.getvalue().splitlines()[1:8] == [
         "FAILED  test  hit wall left hit wall left hit wall left hit wall left hit wall left",

@@ -3,7 +3,7 @@
 import io
 import stat
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -93,30 +93,12 @@ def test_an_archive_writes_only_into_its_report(api: Api, tmp_path: Path) -> Non
     assert not (tmp_path / "target" / "3" / "dodo-report" / "link").is_symlink()
 
 
-def archive(change: Callable[[bytearray], None]) -> bytes:
-    """A compressed report, changed."""
+def archive(name: str = "dodo-report/results.json") -> bytes:
+    """A compressed report, with a file of another name."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as opened:
-        opened.writestr("dodo-report/results.json", bytes(range(256)) * 40)
-    data = bytearray(buffer.getvalue())
-    change(data)
-    return bytes(data)
-
-
-def damage(data: bytearray) -> None:
-    """In the compressed bytes, behind the entry's header of 30 bytes and its name."""
-    begin = 30 + len("dodo-report/results.json")
-    data[begin : begin + 8] = b"\xff" * 8
-
-
-def encrypt(data: bytearray) -> None:
-    """As the flag of the central directory says (APPNOTE, section 4.4.4)."""
-    data[data.index(b"PK\x01\x02") + 8] |= 1
-    data[6] |= 1
-
-
-def renamed(name: str) -> bytes:
-    return archive(lambda data: None).replace(b"dodo-report/results.json", name.ljust(24, "x").encode())
+        opened.writestr(name, bytes(range(256)) * 40)
+    return buffer.getvalue()
 
 
 EXPECTED = "expected a zip archive with dodo-report/results.json"
@@ -126,16 +108,12 @@ EXPECTED = "expected a zip archive with dodo-report/results.json"
     ("data", "said"),
     [
         (b"not a zip", f"its artifacts, job 3, cannot be read (File is not a zip file), {EXPECTED}"),
-        (archive(lambda _: None)[:-30], EXPECTED),
-        (archive(damage), EXPECTED),
-        (archive(encrypt), f"is encrypted, password required for extraction), {EXPECTED}"),
-        (archive(lambda data: data.__setitem__(slice(data.index(b"PK\1\2") + 16, data.index(b"PK\1\2") + 20), b"abcd")),
-         f"(Bad CRC-32 for file 'dodo-report/results.json'), {EXPECTED}"),
-        (archive(lambda _: None), "dodo-report/results.json: not results of DoDo ("),
-        (renamed("dodo-report/test.rec"), "there is no dodo-report/results.json"),
-        (renamed("elsewhere/"), "job 'look' has no report"),
+        (archive()[:-30], EXPECTED),
+        (archive(), "dodo-report/results.json: not results of DoDo ("),
+        (archive("dodo-report/test.rec"), "there is no dodo-report/results.json"),
+        (archive("elsewhere/"), "job 'look' has no report"),
     ],
-    ids=["no zip", "truncated", "damaged", "encrypted", "crc", "other results", "no results", "no report"],
+    ids=["no zip", "truncated", "other results", "no results", "no report"],
 )  # fmt: skip
 def test_a_job_without_a_whole_report_is_named_and_the_others_are_drawn(
     data: bytes, said: str, api: Api, tmp_path: Path
