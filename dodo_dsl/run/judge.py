@@ -1,16 +1,18 @@
 """The evaluators of a test, as processes, on the recording of a test."""
 
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import BinaryIO
 
-from dodo_dsl.plan.model import Plan, PlannedService
+from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import service_protocol
 from dodo_dsl.run.outcomes import Facts, Finding, decide, how_it_ended
-from dodo_dsl.run.process.commands import Command, Commands
+from dodo_dsl.run.process.commands import Commands
+from dodo_dsl.run.process.confinement import Command
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Malformed, Noted, VerdictEvent
 from dodo_dsl.run.test_recording import TestRecording
@@ -29,14 +31,6 @@ class Judgement:
     last_lines: tuple[str, ...] = ()
 
 
-@dataclass
-class _Running:
-    service: PlannedService
-    process: "subprocess.Popen[bytes]"
-    output: BinaryIO
-    log: BinaryIO
-
-
 def judge(plan: Plan, folder: Path, recording: TestRecording, cid: int, work: Path) -> Judgement:
     """Let the evaluators of a Plan judge; ``folder`` is the compiled test's, ``work`` an empty one for their files.
 
@@ -48,11 +42,14 @@ def judge(plan: Plan, folder: Path, recording: TestRecording, cid: int, work: Pa
     tails: dict[str, tuple[str, ...]] = {}
     with ExitStack() as stack:
         services = [service for service in plan.services if service.judge]
-        running = [stack.enter_context(_started(s, commands.of(s), recording, work)) for s in services]
-        for one in running:
-            code = one.process.wait()
-            tails[one.service.name] = _collect(one, facts, notes)
-            _take_end(one.service.name, code, facts, recording)
+        running = [stack.enter_context(_started(commands.of(each), recording, work)) for each in services]
+        for name, (process, output, log) in zip(facts.evaluators, running, strict=True):
+            code = process.wait()
+            _collect(name, output, facts, notes)
+            log.seek(0)
+            last = log.read().splitlines()[-_TAIL_LINES:]
+            tails[name] = tuple(line.decode("utf-8", "replace")[:_TAIL_WIDTH] for line in last if line.strip())
+            _take_end(name, code, facts, recording)
     finding = decide(facts)
     verdicts = tuple(verdict for name in facts.evaluators for verdict in facts.verdicts.get(name, []))
     last_lines = tails.get(finding.service, ()) if finding.result != "passed" else ()
@@ -60,30 +57,27 @@ def judge(plan: Plan, folder: Path, recording: TestRecording, cid: int, work: Pa
 
 
 @contextmanager
-def _started(service: PlannedService, command: Command, recording: TestRecording, work: Path) -> Iterator[_Running]:
-    """An evaluator that is killed at the end, if it still runs."""
+def _started(
+    command: Command, recording: TestRecording, work: Path
+) -> Iterator[tuple["subprocess.Popen[bytes]", BinaryIO, BinaryIO]]:
+    """An evaluator that is killed at the end, if it still runs, what it prints, and its log."""
     kept = {name: value for name, value in command.environment.items() if name not in NOT_OF_A_RECORDING}
-    environment = {
-        **kept,
-        "DODO_CLOCK": "recording",
-        "DODO_RECORDING": str(recording.path.resolve()),
-    }
-    with (work / f"{service.name}.out").open("w+b") as output, (work / f"{service.name}.log").open("w+b") as log:
+    environment = {**kept, "DODO_CLOCK": "recording", "DODO_RECORDING": str(recording.path.resolve())}
+    with TemporaryFile(dir=work) as output, TemporaryFile(dir=work) as log:
         process = subprocess.Popen(
             command.argv, env=environment, cwd=command.folder, stdin=subprocess.DEVNULL, stdout=output, stderr=log
         )
         try:
-            yield _Running(service, process, output, log)
+            yield process, output, log
         finally:
             process.kill()
             process.wait()
 
 
-def _collect(one: _Running, facts: Facts, notes: list[str]) -> tuple[str, ...]:
-    """Take what an evaluator printed; returns the last lines of its log."""
-    name = one.service.name
-    one.output.seek(0)
-    for line in one.output:
+def _collect(name: str, output: BinaryIO, facts: Facts, notes: list[str]) -> None:
+    """Takes what an evaluator printed."""
+    output.seek(0)
+    for line in output:
         match service_protocol.read(name, True, line):
             case VerdictEvent() as verdict:
                 facts.verdicts.setdefault(name, []).append(verdict)
@@ -92,12 +86,6 @@ def _collect(one: _Running, facts: Facts, notes: list[str]) -> tuple[str, ...]:
                 facts.findings.append(Finding("error", text, name))
             case Noted(text):
                 notes.append(text)
-    one.log.seek(0)
-    return _tail(one.log.read().splitlines())
-
-
-def _tail(lines: Sequence[bytes]) -> tuple[str, ...]:
-    return tuple(line.decode("utf-8", "replace")[:_TAIL_WIDTH] for line in lines[-_TAIL_LINES:] if line.strip())
 
 
 def _take_end(name: str, code: int, facts: Facts, recording: TestRecording) -> None:

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn
@@ -20,7 +20,7 @@ from typing import NoReturn
 from dodo_dsl.run.machine_load.processes import above, living, owners
 from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.process import confined_process, namespaces
-from dodo_dsl.run.process.confinement import Confinement
+from dodo_dsl.run.process.confinement import Command
 from dodo_dsl.run.process.places import Places
 from dodo_dsl.run.process.process_group import ProcessGroup
 
@@ -30,24 +30,24 @@ _KILL_TRIES, _KILL_S = 100, 0.01
 _DESCRIPTORS = 65_536
 
 
-def _forked(words: Sequence[str], environment: Mapping[str, str], folder: str, output: int) -> int:
+def _forked(command: Command, output: int) -> int:
     """The process id of a child of this process, which has one thread, in a separate session.
 
-    ``words`` are ``python -m MODULE`` and its arguments; raises OSError when the folder cannot be entered.
+    The command is ``python -m MODULE`` with arguments; raises OSError when its folder cannot be entered.
     """
-    Path(folder).stat()
+    Path(command.folder).stat()
     sys.stderr.flush()
     if (pid := os.fork()) == 0:
-        _become(words, environment, folder, output)
+        _become(command, output)
     return pid
 
 
-def _become(words: Sequence[str], environment: Mapping[str, str], folder: str, output: int) -> NoReturn:
+def _become(command: Command, output: int) -> NoReturn:
     code = 1
     try:
-        _set_up(environment, folder, output)
-        sys.argv[:] = words[2:]
-        runpy.run_module(words[2], run_name="__main__", alter_sys=True)
+        _set_up(command, output)
+        sys.argv[:] = command.argv[2:]
+        runpy.run_module(command.argv[2], run_name="__main__", alter_sys=True)
         code = 0
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else 0 if end.code is None else 1
@@ -61,7 +61,7 @@ def _become(words: Sequence[str], environment: Mapping[str, str], folder: str, o
         os._exit(code & 0xFF)
 
 
-def _set_up(environment: Mapping[str, str], folder: str, output: int) -> None:
+def _set_up(command: Command, output: int) -> None:
     """Session, signals, descriptors, variables and folder as those of a started program."""
     os.setsid()
     signal.set_wakeup_fd(-1)
@@ -73,8 +73,8 @@ def _set_up(environment: Mapping[str, str], folder: str, output: int) -> None:
         os.dup2(target, number)
     os.closerange(3, _DESCRIPTORS)
     os.environ.clear()
-    os.environ.update(environment)
-    os.chdir(folder)
+    os.environ.update(command.environment)
+    os.chdir(command.folder)
     sys.stdin = open(0, closefd=False)  # noqa: SIM115
     sys.stdout = open(1, "w", buffering=1, closefd=False)  # noqa: SIM115
     sys.stderr = open(2, "w", buffering=1, closefd=False)  # noqa: SIM115
@@ -88,9 +88,9 @@ class _Child:
     """What bubblewrap says of an application's program; -1 for others."""
     memory: int = 0
     """Bytes that it may use at most, 0 for no limit."""
+    group: ProcessGroup | None = None
     used: int = 0
     """Bytes for which it was ended."""
-    group: ProcessGroup | None = None
 
 
 class Children:
@@ -112,49 +112,29 @@ class Children:
         self._took_s: dict[str, float] = {}
         """Processor time of the application's programs that ended, by their groups."""
 
-    def fork(self, name: str, words: Sequence[str], environment: dict[str, str], folder: str, output: int) -> int:
-        """Forks this process for a Python module, and gives the process id; raises OSError."""
-        return self._add(_forked(words, environment, folder, output), _Child(name))
+    def start(self, command: Command, output: int, places: Places | None, may_fork: bool) -> int:
+        """Starts a process and gives its id; a module of DoDo's is forked where it ``may_fork``.
 
-    def start(
-        self,
-        name: str,
-        words: Sequence[str],
-        environment: dict[str, str],
-        folder: str,
-        output: int,
-        masked: Sequence[str] = (),
-    ) -> int:
-        """Starts a program that does not see ``masked`` devices, and gives its process id.
-
-        Raises OSError, SubprocessError and ValueError.
+        Raises OSError, SubprocessError, ValueError and NoSeccomp.
         """
+        if command.confined:
+            started = confined_process.start(command, command.confined, output, places, self._umask)
+            self.application[started.process.pid] = command.name
+            return self._add(started.process.pid, _Child(command.name, *started))
+        if may_fork and command.is_module and not command.masked:
+            return self._add(_forked(command, output), _Child(command.name))
         process = subprocess.Popen(
-            words,
-            env=environment,
-            cwd=folder,
+            command.argv,
+            env=command.environment,
+            cwd=command.folder,
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=output,
             start_new_session=True,
             umask=self._umask,
-            preexec_fn=functools.partial(_begin, os.getpid(), masked),  # noqa: PLW1509  (it has one thread)
+            preexec_fn=functools.partial(_begin, os.getpid(), command.masked),  # noqa: PLW1509  (it has one thread)
         )
-        return self._add(process.pid, _Child(name, process))
-
-    def confine(
-        self,
-        name: str,
-        words: Sequence[str],
-        environment: dict[str, str],
-        output: int,
-        confined: Confinement,
-        places: Places | None,
-    ) -> int:
-        """Starts a program of the application; raises as ``start``, and NoSeccomp."""
-        process, status, group = confined_process.start(words, environment, output, confined, places, self._umask)
-        self.application[process.pid] = name
-        return self._add(process.pid, _Child(name, process, status, confined.limits.memory, group=group))
+        return self._add(process.pid, _Child(command.name, process))
 
     def _add(self, pid: int, child: _Child) -> int:
         self._running[pid] = child

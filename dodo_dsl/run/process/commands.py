@@ -1,7 +1,7 @@
 """Commands that start a test's services as local processes: words, variables and folder, for the test's slot."""
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from dodo_dsl.plan.added_services import ANSWERS_VARIABLE, TIME, TIME_FOLDER
 from dodo_dsl.plan.model import DISPLAY_SERVER, ApplicationService, Flag, Plan, PlannedService
 from dodo_dsl.run.application_files import application_paths, variables_of
 from dodo_dsl.run.application_time import ApplicationTime, folder_of
+from dodo_dsl.run.process.confinement import Command
 from dodo_dsl.run.process.environment import (
     application_environment,
     base_environment,
@@ -26,21 +27,6 @@ from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot, named_paths, package_
 from dodo_dsl.run.rigs.ports import masked
 
 _NUL = "\0"
-
-
-@dataclass(frozen=True)
-class Command:
-    """A process to start."""
-
-    name: str
-    layer: str
-    argv: tuple[str, ...]
-    environment: Mapping[str, str]
-    folder: Path
-    is_module: bool = False
-    """Whether it is one of DoDo's own Python modules, which may be forked from a process with their libraries."""
-    masked: tuple[str, ...] = ()
-    """Device files that it must not see: the ports of rigs that it does not move."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +60,7 @@ class Commands:
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
         hidden = tuple(masked(self.plan, service))
-        return Command(service.name, service.layer, words, environment, self.folder, is_module, hidden)
+        return Command(service.name, service.layer, words, environment, str(self.folder), is_module, hidden)
 
     def _flag(self, flag: Flag) -> str:
         values: dict[str, Callable[[], str]] = {
@@ -96,7 +82,7 @@ class Commands:
         assert self.time is not None
         words = self.time.words(self.plan, self.time_folder, on_host=on_host)
         environment = {**base_environment(self.plan.application.access.passed), SLOT_VARIABLE: self.slot.name}
-        return Command(TIME, "environment", words, environment, self.folder)
+        return Command(TIME, "environment", words, environment, str(self.folder))
 
     def _application(self, service: ApplicationService) -> Command:
         folder = (self.folder / self.plan.application.folder).resolve()
@@ -133,7 +119,7 @@ class Commands:
                 f"{what} of '{service.name}' holds a NUL character, which no process takes: remove it"
             )
         hidden = tuple(masked(self.plan, None))
-        return Command(service.name, "application", argv, environment, folder, masked=hidden)
+        return Command(service.name, "application", argv, environment, str(folder), masked=hidden)
 
 
 def _without_windows(argv: Sequence[str], environment: dict[str, str]) -> dict[str, str]:

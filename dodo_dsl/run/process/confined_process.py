@@ -7,11 +7,12 @@ import os
 import resource
 import shutil
 import subprocess
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from dodo_dsl.run.process import confinement, namespaces, process_group, seccomp_filter
-from dodo_dsl.run.process.confinement import PROGRAM, Confinement
+from dodo_dsl.run.process.confinement import PROGRAM, Command, Confinement
 from dodo_dsl.run.process.places import Places
 from dodo_dsl.run.process.process_group import ProcessGroup
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -22,21 +23,20 @@ _BEGAN = b'"exit-code"'
 """What bubblewrap reports only of a program that it could start (``--json-status-fd``)."""
 
 
-def start(
-    words: Sequence[str],
-    environment: Mapping[str, str],
-    output: int,
-    confined: Confinement,
-    places: Places | None,
-    umask: int = -1,
-) -> tuple[subprocess.Popen[bytes], int, ProcessGroup | None]:
-    """Bubblewrap's process, which ends with the program and gives its exit code, a descriptor for ``ended``, its group.
+class Started(NamedTuple):
+    """Bubblewrap's process, which ends with the program and gives its exit code, and a descriptor for ``ended``."""
 
-    ``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp.
-    """
-    program = _found(words[0], environment, confined.folder)
+    process: subprocess.Popen[bytes]
+    status: int
+    memory: int
+    group: ProcessGroup | None
+
+
+def start(command: Command, confined: Confinement, output: int, places: Places | None, umask: int) -> Started:
+    """``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp."""
+    program = _found(command.argv[0], command.environment, confined.folder)
     user = places.user if places else None
-    given = {**environment, **({"HOME": confinement.HOME} if places else {})}
+    given = {**command.environment, **({"HOME": confinement.HOME} if places else {})}
     others = 0 if user is not None else _threads_of_this_user()
     sandbox = confinement.sandbox_words(confined, places, program, given)
     filtered = {"--seccomp": seccomp_filter.program()} if places else {}
@@ -50,7 +50,7 @@ def start(
             sandbox += [word for name, descriptor in passed.items() for word in (name, str(descriptor))]
             with _in_files({"--args": confinement.as_data(sandbox)}) as files:
                 process = subprocess.Popen(
-                    [PROGRAM, "--args", str(files["--args"]), "--", program, *words[1:]],
+                    [PROGRAM, "--args", str(files["--args"]), "--", program, *command.argv[1:]],
                     env={"PATH": os.environ.get("PATH", os.defpath)},
                     cwd="/",
                     stdin=subprocess.DEVNULL,
@@ -69,7 +69,7 @@ def start(
         if group:
             group.remove()
         raise
-    return process, said, group
+    return Started(process, said, confined.limits.memory, group)
 
 
 def ended(said: int, code: int) -> tuple[int, bool]:

@@ -39,6 +39,22 @@ class Confinement:
     """The folder by which it gets the test's time, where it may write into the page and wake its threads."""
 
 
+@dataclass(frozen=True)
+class Command:
+    """A process to start; an application's is ``confined`` where this machine can do that."""
+
+    name: str
+    layer: str
+    argv: tuple[str, ...]
+    environment: Mapping[str, str]
+    folder: str
+    is_module: bool = False
+    """Whether it is one of DoDo's own Python modules, which may be forked from a process with their libraries."""
+    masked: tuple[str, ...] = ()
+    """Device files that it must not see: the ports of rigs that it does not move."""
+    confined: Confinement | None = None
+
+
 def confinement(folder: Path, limits: SandboxLimits, hidden: Iterable[Path]) -> Confinement:
     """The confinement of an application; of the ``hidden`` paths, those matter that it would see."""
     reads = [str((folder / Path(path).expanduser()).resolve()) for path in limits.reads]

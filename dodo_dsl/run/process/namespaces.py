@@ -121,8 +121,7 @@ def furnish(shown: Collection[Path], trees: Mapping[Path, int]) -> None:
     are empty to the other process, but no files: they may be another test's tokens.
     """
     _keep_mounts_private()
-    with contextlib.suppress(OSError):  # containers may mask /proc; only tools like ps would miss it
-        _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
+    _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
     for folder in filter(Path.is_dir, SHARED):
         old = os.open(folder, os.O_PATH | os.O_DIRECTORY)
         if trees:

@@ -4,10 +4,7 @@ It is process 1 of its own namespaces (``network``), or their parent on the host
 over a socket; when that closes, for whatever reason, the sandbox ends everything that it started, and itself. If it is
 killed, the kernel sends SIGTERM to what it started. It has one thread: that signal depends on the starting thread.
 
-    runner to sandbox   {"do": "start"} with the output's descriptor, and that of a file with {"id", "argv", "env",
-                        "cwd", "fork", "masked", "confined"}, "fork" being whether argv is a Python module for
-                        which a fork of the sandbox will do, "masked" the device files that it must not see,
-                        "confined" the application's confinement or null;
+    runner to sandbox   {"do": "start"} with the output's descriptor, and that of a file with a ``Command``;
                         {"do": "close"}; {"do": "listeners"};
                         {"do": "relay", "cid", "folder"}; {"do": "send", "to": [name, ...], "data"};
                         {"do": "use", "names": services of which memory is measured, too};
@@ -16,11 +13,10 @@ killed, the kernel sends SIGTERM to what it started. It has one thread: that sig
                         {"unstartable": id, "why"}; {"exited": id, "code", "used", "failed"};
                         {"relay": whether it can send};
                         {"listeners": names of what listens on a bus, or null};
-                        {"use": snapshot or null}
+                        {"use": snapshot}
 """
 
 import contextlib
-import functools
 import json
 import os
 import select
@@ -40,7 +36,7 @@ from dodo_dsl.run.listeners import listening
 from dodo_dsl.run.machine_load.service_use import UseReader
 from dodo_dsl.run.process import namespaces, places
 from dodo_dsl.run.process.children import Children
-from dodo_dsl.run.process.confinement import Confinement
+from dodo_dsl.run.process.confinement import Command
 from dodo_dsl.run.process.places import Places
 from dodo_dsl.run.process.seccomp_filter import NoSeccomp
 from dodo_dsl.run.process.slot import Entered
@@ -132,26 +128,15 @@ class Sandbox:
 
     def _do_start(self, descriptors: list[int]) -> None:
         output, file = descriptors
-        command = json.loads(os.pread(file, os.fstat(file).st_size, 0))
-        name, words, environment = command["id"], command["argv"], command["env"]
-        is_fork = not self.is_on_host and command["fork"] and not command["masked"]
-        start = self.children.fork if is_fork else functools.partial(self.children.start, masked=command["masked"])
+        command = msgspec.convert(json.loads(os.pread(file, os.fstat(file).st_size, 0)), Command)
         try:
-            if command["confined"] is not None:
-                pid = self._confine(name, words, environment, output, msgspec.convert(command["confined"], Confinement))
-            else:
-                pid = start(name, words, environment, command["cwd"], output)
-            self.send(started=name, pid=pid)
+            if command.confined and self.places is None and not self.is_on_host:
+                self.places = Places(command.confined.folder, places.own_user())
+            pid = self.children.start(command, output, self.places, may_fork=not self.is_on_host)
+            self.send(started=command.name, pid=pid)
         except (OSError, subprocess.SubprocessError, ValueError, NoSeccomp) as error:
             why = getattr(error, "strerror", None) or str(error)
-            self.send(unstartable=name, why=f"{getattr(error, 'filename', None) or words[0]}: {why}")
-
-    def _confine(
-        self, name: str, words: Sequence[str], environment: dict[str, str], output: int, confined: Confinement
-    ) -> int:
-        if self.places is None and not self.is_on_host:
-            self.places = Places(confined.folder, places.own_user())
-        return self.children.confine(name, words, environment, output, confined, self.places)
+            self.send(unstartable=command.name, why=f"{getattr(error, 'filename', None) or command.argv[0]}: {why}")
 
     def _do_relay(self, _descriptors: list[int], cid: int, folder: str) -> None:
         with contextlib.suppress(OSError):
@@ -163,13 +148,11 @@ class Sandbox:
             self.relay.send(bytes.fromhex(data), to)
 
     def _do_use(self, _descriptors: list[int], names: list[str]) -> None:
-        """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""
         self.use.sized.update(names)
-        taken = self.use.take({**self.children.names, os.getpid(): ""}) if _has_own_proc() else None
-        self.send(use=taken and asdict(self.children.with_counted(taken)))
+        self.send(use=asdict(self.children.with_counted(self.use.take({**self.children.names, os.getpid(): ""}))))
 
     def _do_listeners(self, _descriptors: list[int]) -> None:
-        found = listening(self.children.application) if _has_own_proc() else None
+        found = listening(self.children.application)
         self.send(listeners=None if found is None else sorted(found))
 
     def _do_keep(self, _descriptors: list[int]) -> None:
@@ -177,11 +160,6 @@ class Sandbox:
 
     def _do_close(self, _descriptors: list[int]) -> None:
         self.ended = True
-
-
-def _has_own_proc() -> bool:
-    """Whether ``/proc`` shows processes by their numbers here."""
-    return Path("/proc/self").readlink().name == str(os.getpid())
 
 
 def _in_namespaces(channel: socket.socket, entered: Entered) -> None:

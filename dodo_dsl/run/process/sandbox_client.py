@@ -11,8 +11,10 @@ import struct
 import subprocess
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import asdict
 from typing import Any
 
+from dodo_dsl.run.process.confinement import Command
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server import ForkServer
 from dodo_dsl.run.process.sandbox import MAX_MESSAGE
@@ -93,10 +95,10 @@ class SandboxClient:
         if not self._closing:
             self._on_lost("the test's sandbox ended unexpectedly")
 
-    def start(self, command: dict[str, Any], output: int) -> None:
+    def start(self, command: Command, output: int) -> None:
         """Starts a process with an output, by a file, as words and variables may be longer than a message."""
         with os.fdopen(os.memfd_create("command"), "wb") as file:
-            file.write(json.dumps(command).encode())
+            file.write(json.dumps(asdict(command)).encode())
             file.flush()
             self.send({"do": "start"}, (output, file.fileno()))
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.application.interpolation import EnvironmentProblem
-from dodo_dsl.run.process.commands import Command, Commands
+from dodo_dsl.run.process.commands import Commands
+from dodo_dsl.run.process.confinement import Command
 from dodo_dsl.run.process.slot import Slot
 from tests.application.compiled import FILE, compiled, repository
 from tests.run import scripted
@@ -70,7 +71,7 @@ def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert "FROM_OUTSIDE" not in made.environment
     assert command(tmp_path, monkeypatch, "FROM_OUTSIDE").environment["FROM_OUTSIDE"] == "here"
     assert not {"NOWHERE", "CI_JOB_TOKEN", "UNNAMED"} & set(made.environment)
-    assert made.folder == tmp_path / "team"
+    assert made.folder == str(tmp_path / "team")
 
 
 def test_variables_that_the_deployment_passes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
