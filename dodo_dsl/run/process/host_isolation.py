@@ -8,7 +8,6 @@ import socket
 import struct
 import subprocess
 from collections.abc import AsyncIterator, Callable, Iterator, Sequence
-from typing import Any
 
 from dodo_dsl.opendlv.address import group
 from dodo_dsl.plan.model import Plan
@@ -76,21 +75,10 @@ async def host_slot(
     name = f"dodo-{secrets.token_hex(4)}-"
     about = {"test": plan.slug, "slot": name}
     held: list[leases.Lease] = []
-    claims: list[socket.socket] = []
-
-    def attempt(name: str, about: dict[str, Any], shared: bool) -> leases.Lease | None:
-        if lease := leases.try_lease(name, about, shared):
-            if claim := _claimed(name):
-                claims.append(claim)
-                return lease
-            lease.release()
-        return None
-
     try:
         held.append(await leases.lease_any(["machine"], about, say, shared=not alone))
         order = [plan.cid, *(c for c in cids if c != plan.cid)]
-        lease = await leases.lease_any([f"{leases.CID}{c}" for c in order], about, say, attempt=attempt)
-        held.append(lease)
+        held.append(lease := await leases.lease_any([f"{leases.CID}{c}" for c in order], about, say))
         leftovers.remove_left(lease)
         cid = int(lease.name.removeprefix(leases.CID))
         foreigner = await asyncio.get_running_loop().run_in_executor(None, listen, cid)
@@ -98,39 +86,14 @@ async def host_slot(
             raise BackendError(
                 f"CID {cid} carries foreign traffic from {foreigner}; end it, or set another range of CIDs"
             )
-        descriptors = *(held_lease.descriptor for held_lease in held), *(claim.fileno() for claim in claims)
-        yield Slot(cid, name, "" if alone else name, descriptors)
+        yield Slot(cid, name, "" if alone else name, tuple(held_lease.descriptor for held_lease in held))
     finally:
         if not keep:
             await asyncio.shield(asyncio.to_thread(end_slot, name))  # before its leases are released
         for held_lease in reversed(held):
             held_lease.leave() if keep else held_lease.release()
-        for claim in claims:
-            claim.close()
         if not keep:
             remove_memories(name)
-
-
-def _claimed(name: str) -> socket.socket | None:
-    """Holds a lease's name in this network, of which all users and all lease folders are part; None if it is held.
-
-    An abstract name (unix(7)) lives as long as a process that holds its socket, and is one of a network namespace, as
-    the bus is that it stands for.
-    """
-    claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-    try:
-        claim.bind(f"\0dodo-{name}")
-    except OSError:
-        claim.close()
-        return None
-    return claim
-
-
-def is_claimed(name: str) -> bool:
-    """Whether a program in this network holds a lease's name."""
-    if claim := _claimed(name):
-        claim.close()
-    return claim is None
 
 
 @contextlib.contextmanager

@@ -8,7 +8,6 @@ from typing import Any
 
 from dodo_dsl.run import leases
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.process.host_isolation import is_claimed
 from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.run.rigs.leases import device_keys, devices_of, quarantined
 from dodo_dsl.run.rigs.problems import RigProblem
@@ -31,7 +30,7 @@ async def _chosen(job: Job, say: Say, stack: contextlib.AsyncExitStack) -> Job:
 
     def attempt(name: str, about: dict[str, Any], shared: bool) -> leases.Lease | None:
         cid, *devices = f"cid-{usable[name].plan.cid}", *device_keys(devices_of(usable[name].plan))
-        is_free = not is_claimed(cid) and not any(map(leases.holder, (cid, *devices)))
+        is_free = not any(map(leases.holder, (cid, *devices)))
         return leases.try_lease(name, about, shared) if is_free else None
 
     try:

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.run import capabilities, leases
-from dodo_dsl.run.process import host_isolation, leftovers
+from dodo_dsl.run.process import leftovers
 from dodo_dsl.run.process.host_isolation import host_slot, isolation_refusal
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
 from dodo_dsl.run.protocol import BackendError
@@ -66,22 +66,6 @@ def test_foreign_traffic_is_an_error_that_names_its_sender(cid: int, traffic: in
     with pytest.raises(BackendError, match=rf"CID {cid} carries foreign traffic from [0-9.]+:{traffic}; end it, or "):
         leased(cid)
     assert list(folder.glob("*.lease")) == []
-
-
-@pytest.mark.slow
-def test_a_cid_is_held_against_other_lease_folders(cid: int) -> None:
-    """As those of two users of one machine, who share its bus."""
-    said: list[str] = []
-
-    async def scene() -> None:
-        claim = host_isolation._claimed(f"cid-{cid}")
-        assert claim is not None
-        asyncio.get_running_loop().call_later(0.2, claim.close)
-        async with host_slot(plan(cid=cid), (cid,), said.append, alone=False) as slot:
-            assert (slot.cid, host_isolation._claimed(f"cid-{cid}")) == (cid, None)
-
-    asyncio.run(scene())
-    assert said == ["waiting for another process"]
 
 
 @pytest.mark.slow

@@ -15,7 +15,6 @@ import pytest
 from dodo_dsl.plan.model import Flag, PlannedService, Pooled
 from dodo_dsl.run import leases
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.process import host_isolation
 from dodo_dsl.run.protocol import BackendError, Ready
 from dodo_dsl.run.rigs.leases import leased, quarantine
 from dodo_dsl.run.rigs.pool import opened
@@ -77,15 +76,6 @@ def test_each_takes_another_rig_and_the_next_the_first_that_comes_free(folder: P
 
     assert run(scene()) == ["kiwi-1", "kiwi-2", "kiwi-2"]
     assert said == [f"waiting for test a of process {os.getpid()}", "on rig 'kiwi-2'"]
-
-
-def test_a_rig_that_another_user_has_is_not_free() -> None:
-    """Their leases may be in another folder; the network is the same."""
-    claim = host_isolation._claimed("cid-121")
-    assert claim is not None
-    with claim:
-        assert run(drive("a", 0.0)) == "kiwi-2"
-    assert run(drive("a", 0.0)) == "kiwi-1"
 
 
 def test_rigs_that_are_not_here_or_in_quarantine_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
