@@ -2,7 +2,6 @@
 
 import errno
 import os
-import re
 import signal
 import traceback
 from collections.abc import Iterable, Sequence
@@ -22,13 +21,6 @@ LOG = "logs/runner.log"
 """The traceback of an internal error, in the test's report."""
 _RANK: dict[Result, int] = {"passed": 0, "failed": 1, "error": 2}
 _MAX_ERROR_TEXT = 300
-_NO_DISPLAY = re.compile(
-    r"cannot open display|could not connect to display|can't open display|unable to open (X )?display"
-    r"|no Qt platform plugin could be initialized|Can't initialize GTK backend",
-    re.IGNORECASE,
-)
-
-
 Cause = Literal["", "verdict", "end", "silence", "start"]
 """What decided: an evaluator, the end of a service, an application that did not answer the clock, or a program that
 could not be started; empty for anything else. A machine that is too busy may be the reason of the first three."""
@@ -153,16 +145,6 @@ def unstartable(plan: Plan, service: str, why: str) -> str:
         folder = outside.parent if outside.name == "bin" else outside
         hint = f"; it is there, but the test does not see it: write 'sandbox: {{read: [{folder}]}}' in dodo.yml"
     return f"service '{service}' could not be started: {why}{hint}"
-
-
-def windowless(lines: Sequence[str]) -> str:
-    """What to do about a program that ended as it has no display, by the last lines that it wrote; else empty."""
-    if not any(_NO_DISPLAY.search(line) for line in lines):
-        return ""
-    return (
-        "cannot open display: this program draws a window; start it without one (--verbose, imshow), or write x-dodo: "
-        "{display: true} for its process, or xvfb-run in its image"
-    )
 
 
 def lost_messages(service: PlannedService, messages: int) -> str:

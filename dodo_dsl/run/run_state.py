@@ -23,7 +23,6 @@ from dodo_dsl.run.outcomes import (
     memory_taken,
     outcome_of,
     unstartable,
-    windowless,
 )
 from dodo_dsl.run.protocol import (
     Event,
@@ -235,8 +234,6 @@ class RunState:
             details += self._unmatched
         if finding.result != "error":
             details.append(told_in_words(self.plan.told))
-        if finding.result != "passed" and self.is_application(finding.service):
-            details.append(windowless(self._tails.get(finding.service, ())))
         return list(filter(None, details))
 
     def _all_verdicts_given(self) -> bool:

@@ -13,7 +13,6 @@ from dodo_dsl.run.outcomes import (
     error_reason,
     how_it_ended,
     unstartable,
-    windowless,
 )
 from dodo_dsl.run.protocol import VerdictEvent
 from tests.run.scripted import plan
@@ -85,17 +84,3 @@ def test_an_internal_error_leaves_its_traceback(tmp_path: Path) -> None:
     assert reason.endswith("ccc (traceback in logs/runner.log)")
     assert len(reason) < 400
     assert (tmp_path / "logs" / "runner.log").read_text().startswith("KeyError: ")
-
-
-@pytest.mark.parametrize(
-    "line",
-    [
-        "(template:7): Gtk-WARNING **: 10:00:00.000: cannot open display: ",
-        "qt.qpa.xcb: could not connect to display ",
-        "This application failed to start because no Qt platform plugin could be initialized.",
-        "cv2.error: (-2:Unspecified error) Can't initialize GTK backend in function 'cvInitSystem'",
-    ],
-)
-def test_a_program_that_has_no_display(line: str) -> None:
-    assert windowless(["frame 1", line]).startswith("cannot open display: this program draws a window; ")
-    assert windowless(["frame 1"]) == ""

@@ -1,10 +1,7 @@
 """What a test's containers use, and which of them listen on a bus, by their processes on this machine."""
 
-import contextlib
 import threading
-import time
 from collections.abc import Collection, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,25 +10,19 @@ from docker.errors import DockerException
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.run.listeners import joined, listening
 from dodo_dsl.run.machine_load.processes import PROC
-from dodo_dsl.run.machine_load.service_use import Snapshot, Used, UseReader
+from dodo_dsl.run.machine_load.service_use import Snapshot, UseReader
 
 ELSEWHERE = "the Docker engine runs its containers on another machine or in a virtual one"
-_MEMORY = (("total_rss", "total_shmem"), ("anon", "shmem"))
-"""Rows of anonymous and shared memory in what the engine says, of control groups of version 1 and 2."""
 
 
 class ContainerUse:
-    """``containers`` are those of the engine's client, by service, ``application`` the application's.
-
-    What these use is by their processes here; an engine elsewhere is asked for its own figures.
-    """
+    """``containers`` are those of the engine's client, by service, ``application`` the application's."""
 
     def __init__(self, containers: Mapping[str, Any], application: Collection[str] = (), proc: Path = PROC) -> None:
         self._containers = {name: c for name, c in containers.items() if name not in (SANDBOX, FILES)}
-        self._application = {name: c for name, c in self._containers.items() if name in application}
         self._proc = proc
         self._reader = UseReader(proc)
-        self._reader.sized.update(self._application)
+        self._reader.sized.update(application)
         self._pids: dict[int, str] | None = None
         self._lock = threading.Lock()
 
@@ -40,9 +31,7 @@ class ContainerUse:
         with self._lock:
             if self._pids is None:
                 self._pids = self.first(self._containers) or {}
-            taken = self._reader.take(self._pids) if self._pids else Snapshot(time.monotonic(), {})
-            services = dict(taken.services) or {n: use for n, c in self._application.items() if (use := _asked(c))}
-            return replace(taken, services=services) if services else None
+            return self._reader.take(self._pids) if self._pids else None
 
     def listeners(self, names: Collection[str], cid: int) -> set[str] | None:
         """The services among ``names`` that listen on an OpenDLV bus already; None if that cannot be seen.
@@ -61,16 +50,6 @@ class ContainerUse:
         """The first processes of containers that run; None if one of them is not found here."""
         found = {name: first_process(c, self._proc) for name, c in self._containers.items() if name in names}
         return None if None in found.values() else {pid: name for name, pid in found.items() if pid}
-
-
-def _asked(container: Any) -> Used | None:
-    """What a container used by the engine (``GET /containers/ID/stats``), if it knows."""
-    with contextlib.suppress(DockerException, OSError, KeyError, TypeError, StopIteration):
-        stats = container.client.api.stats(container.id, stream=False, one_shot=True)
-        rows = stats["memory_stats"]["stats"]
-        names = next(names for names in _MEMORY if names[0] in rows)
-        return Used(stats["cpu_stats"]["cpu_usage"]["total_usage"] * 1e-9, memory=sum(rows[name] for name in names))
-    return None
 
 
 def first_process(container: Any, proc: Path = PROC) -> int | None:

@@ -55,7 +55,7 @@ class Pulls:
         problem = f"image {image} cannot be pulled: {text.removeprefix('Error response from daemon: ')}"
         if await asyncio.to_thread(self._has, image):
             return f"{problem}; the local image is used"
-        raise BackendError(f"{problem}{_login(image, text)}{building(plan, image)}")
+        raise BackendError(f"{problem}{building(plan, image)}")
 
     def _has(self, image: str) -> bool:
         try:
@@ -65,14 +65,6 @@ class Pulls:
         except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine cannot inspect image {image}: {error}") from error
         return True
-
-
-def _login(image: str, text: str) -> str:
-    """How to log in to a registry that refuses; Docker's own says that itself, also of what it does not have."""
-    host = image.partition("/")[0]
-    is_named = "/" in image and ("." in host or ":" in host or host == "localhost")
-    is_refused = any(word in text for word in ("unauthorized", "denied", "no basic auth"))
-    return f"; if the registry requires a login: docker login {host}" if is_named and is_refused else ""
 
 
 def building(plan: Plan, image: str) -> str:

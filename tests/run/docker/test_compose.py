@@ -141,9 +141,7 @@ def test_an_image_that_cannot_be_pulled(folder: Path, monkeypatch: pytest.Monkey
     program.write_text("#!/bin/sh\necho 'Error response from daemon: denied' >&2\nexit 1\n")
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
-    told = (
-        "image r.example.org/a cannot be pulled: denied; if the registry requires a login: docker login r.example.org"
-    )
+    told = "image r.example.org/a cannot be pulled: denied"
     with pytest.raises(BackendError, match=f"^{told}$"):
         asyncio.run(test.provide_images(Pulls(EmptyEngine())))
 
