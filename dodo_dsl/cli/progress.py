@@ -67,11 +67,6 @@ def count(number: int, what: str = "test") -> str:
     return f"{number} {what}{'s' * (number != 1)}"
 
 
-def about(seconds: float) -> str:
-    """A forecast in words."""
-    return f"about {seconds / 60:.0f} min" if seconds > 180 else f"about {seconds:.0f} s"
-
-
 def choose(stream: TextIO, slugs: Sequence[str], verbosity: Verbosity = Verbosity.NORMAL) -> Progress:
     if verbosity is Verbosity.QUIET:
         return NoProgress()

@@ -33,7 +33,7 @@ from dodo_dsl.run.process.fork_server import ForkServer
 from dodo_dsl.run.process.side import may_enter
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.runner import BackendName, Policy, Runner, default_backend
-from dodo_dsl.run.schedule import schedule
+from dodo_dsl.run.schedule import Schedule
 from dodo_dsl.run.work_folder import WorkFolder, reap_folders, work_folder
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.model import CLOCKS, LEVELS
@@ -186,13 +186,12 @@ def runner_of(
     plans = [job.plan for job in jobs]
     backend = options.backend or choose_backend(plans)
     history = History()
-    order = schedule(options.jobs, lambda j: typical_s(history.of(j.plan.spec, j.test, backend, j.plan.clock)))
-    estimate = order.estimate(jobs)
+    order = Schedule(options.jobs, lambda j: typical_s(history.of(j.plan.spec, j.test, backend, j.plan.clock)))
     most = max(1, min(order.capacity // min(order.need(job) for job in jobs), len(jobs)))
     at_once = f"{'up to ' * (len(jobs) > 1)}{most} at a time"
     if options.verbosity is not Verbosity.QUIET:
-        takes = "" if estimate is None else f"; {progress.about(estimate)}"
-        stdout.write(f"{progress.count(len(jobs))}, {at_once}, {backend} backend{takes}\n")
+        stdout.write(f"{progress.count(len(jobs))}, {at_once}, {backend} backend
+")
     shown = progress.choose(stdout, [p.slug for p in plans], options.verbosity)
     _require_possible(options, backend, plans)
     cids, nets, held = deployment.cids, subnets(deployment.subnets), (folder.lease.descriptor,)

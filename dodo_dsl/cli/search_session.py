@@ -19,7 +19,7 @@ from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors
 from dodo_dsl.diagnostics import has_errors, ordered
 from dodo_dsl.run.backends import CombinedBackends
 from dodo_dsl.run.process.fork_server import ForkServer
-from dodo_dsl.run.schedule import schedule
+from dodo_dsl.run.schedule import Schedule
 from dodo_dsl.run.work_folder import WorkFolder, reap_folders, work_folder
 from dodo_dsl.search.drives import Drives, KeptBackends, end_like_interrupt
 from dodo_dsl.search.store import Store
@@ -74,7 +74,7 @@ class SearchSession:
             "process", deployment.cids, isolation=options.isolation,
             descriptors=(self.folder.lease.descriptor,), fork_server=self.server,
         )  # fmt: skip
-        order = schedule(options.jobs)
+        order = Schedule(options.jobs)
         progress = _Lines(self.stdout)
         return Drives(study.checked, store, KeptBackends(backends), order, self.folder.path, progress, folder, shared)
 

@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import os
 from collections.abc import AsyncIterator, Callable, Sequence
-from dataclasses import dataclass
 
 from dodo_dsl.run.backends import Job
 
@@ -14,31 +13,20 @@ _RIG = 2
 Took = Callable[[Job], float | None]
 
 
-def schedule(jobs: int | None, took: Took = lambda _: None) -> "Schedule":
-    """A schedule of ``jobs`` at once, or of as many as there are cores for this process."""
-    if jobs is not None:
-        return Schedule(jobs, lambda _: 1, took)
-    return Schedule(len(os.sched_getaffinity(0)), lambda job: _RIG if job.plan.rig else 1, took)
-
-
-@dataclass(frozen=True)
 class Schedule:
-    """How many cores there are, how many each job needs, and how long it took in s, None if it never ran."""
+    """So many ``jobs`` at once, or as many as there are cores; ``took`` says how long one took in s, if known."""
 
-    capacity: int
-    need: Callable[[Job], int]
-    took: Took = lambda _: None
+    def __init__(self, jobs: int | None, took: Took = lambda _: None) -> None:
+        self.capacity, self._took = len(os.sched_getaffinity(0)) if jobs is None else jobs, took
+        self._on_rig = _RIG if jobs is None else 1
+
+    def need(self, job: Job) -> int:
+        """How many of them a job takes."""
+        return self._on_rig if job.plan.rig else 1
 
     def ordered(self, jobs: Sequence[Job]) -> list[Job]:
         """The longest first, so that none of them runs alone at the end; an unknown one may take its whole timeout."""
-        return sorted(jobs, key=lambda job: self.took(job) or job.plan.timeout_s, reverse=True)
-
-    def estimate(self, jobs: Sequence[Job]) -> float | None:
-        """Seconds that all cores are busy with the jobs, or that the longest one takes; None if one is unknown."""
-        known = [(took, min(self.need(job), self.capacity)) for job in jobs if (took := self.took(job)) is not None]
-        if len(known) < len(jobs):
-            return None
-        return max(sum(took * need for took, need in known) / self.capacity, *(took for took, _ in known))
+        return sorted(jobs, key=lambda job: self._took(job) or job.plan.timeout_s, reverse=True)
 
 
 class CorePool:

@@ -13,7 +13,7 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan, PlannedService
 from dodo_dsl.run.backends import Backends, CombinedBackends, Job
 from dodo_dsl.run.runner import Policy, Runner
-from dodo_dsl.run.schedule import schedule
+from dodo_dsl.run.schedule import Schedule
 from tests.run import scripted
 
 READY = 'print(\'{"dodo": "ready"}\', flush=True)\n'
@@ -120,7 +120,7 @@ class Bench:
             backends = backends or CombinedBackends("process", cids, isolation=self.isolation)
             if self.isolation == "host":
                 plans = tuple(replace(plan, cid=cids[0]) for plan in plans)
-            self.runner = Runner(self.progress, backends, schedule(parallel), policy or Policy())
+            self.runner = Runner(self.progress, backends, Schedule(parallel), policy or Policy())
             return asyncio.run(self.runner.run(self.jobs(*plans)))
 
     def log(self, plan: Plan, name: str) -> str:

@@ -50,7 +50,7 @@ class Scene:
     """When attempts began, and how many tests ran then."""
 
     def run(self, *plans: Plan, keep: bool = False) -> list[Outcome]:
-        order = Schedule(self.capacity, lambda _: 1)
+        order = Schedule(self.capacity)
         self.runner = Runner(self.progress, self.backends, order, self.policy, keep)
         return run(self._run(jobs(self.folder, *plans)))
 

@@ -108,9 +108,8 @@ def test_exit_code_and_counts(dodo: Command, ending: str, code: int) -> None:
     assert dodo.result()["outcome"] == ending
 
 
-def test_a_second_run_says_how_long_it_takes_and_shows_the_first(dodo: Command) -> None:
-    assert "process backend\n" in dodo.run()[1]
-    assert "process backend; about " in dodo.run()[1]
+def test_a_second_run_shows_the_first(dodo: Command) -> None:
+    assert all("process backend\n" in dodo.run()[1] for _ in range(2))
     assert "2 of 2 passed</dd>" in Path("report/index.html").read_text()
 
 

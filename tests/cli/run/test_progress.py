@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from dodo_dsl.cli.live_table import LiveProgress
-from dodo_dsl.cli.progress import PlainProgress, about, count
+from dodo_dsl.cli.progress import PlainProgress, count
 from tests.cli.terminal import SAID, Terminal, shown, wide
 from tests.report.test_report_folder import OUTCOME
 
@@ -40,9 +40,8 @@ def test_nothing_said_moves_the_cursor(kind: type[LiveProgress] | type[PlainProg
     assert "noted�[2J�::error::x" in shown(terminal.getvalue())
 
 
-def test_counts_and_forecasts_in_words() -> None:
+def test_counts_in_words() -> None:
     assert [count(0), count(1), count(2), count(1, "stale test")] == ["0 tests", "1 test", "2 tests", "1 stale test"]
-    assert [about(2.6), about(180), about(200)] == ["about 3 s", "about 180 s", "about 3 min"]
 
 
 def test_a_running_test_has_a_line_with_its_time(terminal: Terminal) -> None:
