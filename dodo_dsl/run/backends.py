@@ -104,7 +104,8 @@ class CombinedBackends:
 
     def close(self) -> None:
         for kind in self._kinds:
-            kind.close()
+            if isinstance(kind, Processes):
+                kind.close()
 
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:

@@ -33,7 +33,6 @@ class Capability:
 
 
 def namespaces() -> Iterator[Capability]:
-    """Whether tests can have their own namespaces."""
     if why := host_isolation.isolation_refusal():
         way = "for applications you trust, --isolation host"
         yield Capability("namespaces", "problem", f"an application cannot be isolated: {why}", way)
@@ -45,7 +44,6 @@ _CID, _RECEIVE_S = 254, 1.0
 
 
 def multicast() -> Iterator[Capability]:
-    """Whether a datagram to a multicast group is received."""
     try:
         with host_isolation.joined(_CID) as receiver, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             receiver.settimeout(_RECEIVE_S)
@@ -61,7 +59,6 @@ def multicast() -> Iterator[Capability]:
 
 
 def docker_engine() -> Iterator[Capability]:
-    """Whether a Docker engine answers."""
     try:
         with contextlib.closing(connect()) as client:
             version = client.version()
@@ -78,7 +75,6 @@ _COMPOSE = (2, 20)
 
 
 def compose_plugin() -> Iterator[Capability]:
-    """Whether there is Compose of a version that DoDo supports."""
     command = ["docker", "compose", "version", "--short"]
     try:
         text = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
@@ -108,7 +104,6 @@ def emulated_rig() -> Iterator[Capability]:
 
 
 def left_behind() -> Iterator[Capability]:
-    """What killed runs left."""
     left = []
     for lease in (lease for prefix in (leases.CID, leases.PROJECT) for lease in leases.orphans(prefix)):
         left.append(f"test {lease.left.get('test', '?')}")
@@ -120,7 +115,6 @@ def left_behind() -> Iterator[Capability]:
 
 
 def rigs() -> Iterator[Capability]:
-    """The rigs in quarantine."""
     try:
         for rig, reason in all_quarantined().items():
             yield Capability(

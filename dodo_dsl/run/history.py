@@ -53,7 +53,6 @@ class History:
         self._runs = [run for run in _read(self.path) if run.repository == self._repository]
 
     def of(self, spec: str, test: str, backend: str, clock: str) -> list[PastRun]:
-        """The runs of a test, the latest last."""
         key = (spec, test, backend, clock)
         return [run for run in self._runs if (run.spec, run.test, run.backend, run.clock) == key]
 

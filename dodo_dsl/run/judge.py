@@ -75,7 +75,6 @@ def _started(
 
 
 def _collect(name: str, output: BinaryIO, facts: Facts, notes: list[str]) -> None:
-    """Takes what an evaluator printed."""
     output.seek(0)
     for line in output:
         match service_protocol.read(name, True, line):

@@ -80,7 +80,6 @@ class RunState:
     response: Response | None = None
     notes: list[str] = field(default_factory=list)
     graph: list[str] = field(default_factory=list)
-    """What is wrong in the application's ROS graph."""
     began: float | None = None
     finished: float | None = None
     setup_s: float | None = None
@@ -133,7 +132,7 @@ class RunState:
             case Malformed(service, problem):
                 self.end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)
             case Unstartable(service, why):
-                self.end("error", unstartable(self.plan, service, why), service, "start")
+                self.end("error", unstartable(service, why), service, "start")
             case Lost(why):
                 self.end("error", why)
             case Flooded():
@@ -207,8 +206,7 @@ class RunState:
             )
             if not is_done and not self._all_verdicts_given():
                 reason = f"application service '{service}' {ended}, before the test was decided"
-                waits = start_order.waits(self.plan.application.services, service) if self.began is None else ""
-                self.end("failed", f"{reason}; {waits}" if waits else reason, service, "end")
+                self.end("failed", reason, service, "end")
             if not is_done:
                 self.note_end(event, is_asked=False)
         elif code != 0:

@@ -23,7 +23,6 @@ class Conditions:
         self._known: dict[tuple[str, str], asyncio.Future[str]] = {}
 
     def of(self, name: str) -> Mapping[str, str]:
-        """The services for which one waits, each with its condition."""
         return self._after.get(name, {})
 
     def started(self, name: str) -> None:
@@ -98,13 +97,6 @@ def in_turn(start: Coroutine[Any, Any, None], failed: Callable[[str], None]) -> 
     task = asyncio.ensure_future(start)
     task.add_done_callback(ended)
     return task
-
-
-def waits(services: Iterable[ApplicationService], name: str) -> str:
-    """The services that wait for a service and for what, as half a sentence; empty where nobody does."""
-    found = ((s.name, s.after[name]) for s in services if name in s.after)
-    told = [f"'{other}' waits for it to {_ASKED[condition]}" for other, condition in found if condition != STARTED]
-    return told[0] if told else ""
 
 
 def one_off(services: Iterable[ApplicationService]) -> set[str]:

@@ -1,9 +1,9 @@
 """What a recording says of its test: clock and duration."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 
@@ -51,9 +51,9 @@ def inspect(path: Path) -> TestRecording:
         begin = recording.envelope(int(begins[0]))
         step, end = (_last_mark(recording, messages.id(name)) for name in (STEP, END))
         if step is not None:
-            marks = Marks.read(recording, messages)
-            times = [time for _, _, time in marks.steps]
-            fault = _damage(recording) or marks.fault() or _own_fault(recording, marks)
+            steps = _step_marks(recording, messages)
+            times = [time for _, _, time in steps]
+            fault = _damage(recording) or _order_fault(recording, steps) or _own_fault(recording, messages)
             start = min(times) if fault else begin.sample_time
             return TestRecording(path, "lockstep", _seconds(max(times) - start), fault)
         if not begin.received:
@@ -66,29 +66,20 @@ def inspect(path: Path) -> TestRecording:
         return TestRecording(path, "realtime", _seconds(last - begin.received), fault)
 
 
-@dataclass(frozen=True)
-class Marks:
-    """The marks of a recording in lockstep: row, number and time of each step's, and their ids."""
+def _step_marks(recording: Recording, messages: MessageSet) -> list[tuple[int, int, int]]:
+    """Row, number and time of each step's mark from the recorder itself."""
+    id_ = messages.id(STEP)
+    rows = [row for row in recording.rows([id_]).tolist() if not recording.envelope(row).received]
+    said = (messages.decode(id_, recording.envelope(row).payload) for row in rows)
+    return [(row, mark.number, mark.time) for row, mark in zip(rows, said, strict=True)]
 
-    recording: Recording
-    steps: tuple[tuple[int, int, int], ...]
-    ids: tuple[int, ...]
 
-    @classmethod
-    def read(cls, recording: Recording, messages: MessageSet) -> Self:
-        id_ = messages.id(STEP)
-        rows = [row for row in recording.rows([id_]).tolist() if not recording.envelope(row).received]
-        said = (messages.decode(id_, recording.envelope(row).payload) for row in rows)
-        steps = tuple((row, mark.number, mark.time) for row, mark in zip(rows, said, strict=True))
-        return cls(recording, steps, (id_, messages.id(END), messages.id(BEGIN)))
-
-    def fault(self) -> str:
-        """Steps that do not follow each other."""
-        for (_, number, time), (row, next_number, next_time) in pairwise(self.steps):
-            where = recording_times.place(self.recording, row)
-            if next_number < number or (next_number == number) != (next_time == time) or next_time < time:
-                return f"{where} goes back, from step {number} to {next_number}"
-        return ""
+def _order_fault(recording: Recording, steps: Sequence[tuple[int, int, int]]) -> str:
+    """Steps that do not follow each other."""
+    for (_, number, time), (row, next_number, next_time) in pairwise(steps):
+        if next_number < number or (next_number == number) != (next_time == time) or next_time < time:
+            return f"{recording_times.place(recording, row)} goes back, from step {number} to {next_number}"
+    return ""
 
 
 def _damage(recording: Recording) -> str:
@@ -97,13 +88,13 @@ def _damage(recording: Recording) -> str:
     return f"{recording.damage}" if places else ""
 
 
-def _own_fault(recording: Recording, marks: Marks) -> str:
+def _own_fault(recording: Recording, messages: MessageSet) -> str:
     """What is wrong with messages of the test's services, which have no time of receipt; others may send anything.
 
     A player may begin its recording again, and then goes back to the times in it: steps alone give the order.
     """
-    types = recording.index["data_type"]
-    own = np.flatnonzero((_received(recording) == 0) & ~np.isin(types, list(marks.ids)))
+    types, marks = recording.index["data_type"], [messages.id(name) for name in (BEGIN, STEP, END)]
+    own = np.flatnonzero((_received(recording) == 0) & ~np.isin(types, marks))
     return recording_times.fault(recording, own, in_order=PLAYER not in types[own])
 
 

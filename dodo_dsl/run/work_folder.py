@@ -40,7 +40,6 @@ class WorkFolder:
 
 
 def work_folder() -> WorkFolder:
-    """A folder with a fresh name, leased."""
     token = secrets.token_hex(4)
     path = Path(tempfile.gettempdir()).resolve() / f"{FOLDER_PREFIX}{token}"
     lease = leases.try_lease(f"{leases.RUN}{token}", {"folder": str(path)})
@@ -49,7 +48,6 @@ def work_folder() -> WorkFolder:
 
 
 def reap_folders() -> None:
-    """Removes the folders of killed runs."""
     for lease in leases.orphans(leases.RUN):
         folder = Path(str(lease.left.get("folder", "")))
         if folder.name == f"{FOLDER_PREFIX}{lease.name.removeprefix(leases.RUN)}":

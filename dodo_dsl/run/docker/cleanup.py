@@ -115,7 +115,6 @@ def reap_projects(client: Any) -> Reaped:
 
 
 def writers(plan: Plan) -> set[str]:
-    """The services that write files of the report."""
     return {service.name for service in plan.services if any(flag.kind == "report" for flag in service.flags)}
 
 

@@ -84,7 +84,6 @@ class Compose:
     channel: str = ""
     is_whole: bool = True
     by_answers: bool = False
-    """Whether the application keeps the machine's time in lockstep."""
     services: dict[str, Any] = field(init=False)
     _binds: dict[str, list[Bind]] = field(init=False)
     _outside: dict[str, str] = field(default_factory=dict)
@@ -109,7 +108,6 @@ class Compose:
         self._require_own()
 
     async def require_plugin(self) -> None:
-        """Raises BackendError where the docker command cannot compose."""
         code, _ = await self.run("version")
         if code:
             raise BackendError(f"the docker command has no 'compose' of version 2: {advice.DOCKER}")

@@ -18,9 +18,6 @@ from dodo_dsl.run.docker.side import ContainerSide
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.run.sides import Side, WatchedServices
-from dodo_dsl.spec.rig import CAMERA_SOURCE, RPICAM
-
-_FLAG = CAMERA_SOURCE.rpartition(".")[2]
 
 
 class Containers:
@@ -46,12 +43,9 @@ class Containers:
         for left in reaped.left:
             note(f"what a killed run left cannot be removed: {left}")
 
-    def close(self) -> None:
-        """Does nothing: only the tests' own containers run, and each test removes them."""
-
-    def problem(self, plan: Plan, _isolation: str) -> str:
+    def problem(self, _plan: Plan, _isolation: str) -> str:
         """Why a test cannot run here, in a sentence; empty if it can."""
-        return (unfit_camera(plan) if self._is_whole else "") or self._problem
+        return self._problem
 
     @contextlib.contextmanager
     def side(self, watched: WatchedServices, slot: Slot, _isolation: str, say: Say) -> Iterator[Side]:
@@ -70,17 +64,6 @@ class Containers:
             yield side
         finally:
             lease.leave() if side.left_behind else lease.release()
-
-
-def unfit_camera(plan: Plan) -> str:
-    """Which service takes pictures by ``rpicam-vid``, a program of the rig's computer, in a sentence; else empty."""
-    for service in plan.services:
-        if any((flag.name, flag.value) == (_FLAG, RPICAM) for flag in service.flags):
-            return (
-                f"service '{service.name}' needs the program rpicam-vid of the rig's computer, which containers do not "
-                "have: use --backend mixed or process"
-            )
-    return ""
 
 
 def other_subnets(first: str, all_subnets: Iterable[str]) -> Iterator[str]:

@@ -38,7 +38,6 @@ def binds(service: Mapping[str, Any], folder: Path) -> Iterator[Bind]:
 
 
 def target_of(mount: str | Mapping[str, Any]) -> str:
-    """Where a container has a mount."""
     if isinstance(mount, str):
         parts = mount.split(":")
         return (parts[1] if len(parts) > 1 else mount).replace("$$", "$")

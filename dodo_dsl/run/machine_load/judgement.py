@@ -98,7 +98,6 @@ class JudgedFigures:
         return replace(self, findings=self.findings + findings, checks=(*self.checks, with_margin(check)))
 
     def noted(self, *notes: str) -> "JudgedFigures":
-        """With those notes that are not empty."""
         return replace(self, notes=(*self.notes, *filter(None, notes)))
 
 

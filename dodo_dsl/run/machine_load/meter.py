@@ -136,7 +136,6 @@ class Meter:
         return Wait(sum(ran for ran, _ in spent.values()), min(waited_s, took_s), min(displaced_s, took_s), name)
 
     def figures(self, names: Collection[str]) -> tuple[ServiceUse, ...]:
-        """What each of some services used."""
         passed_s, found = self._times[-1] - self._times[0] if self._times else 0.0, []
         for name in sorted({*names} & self._services.keys()):
             service = self._services[name]

@@ -39,7 +39,6 @@ class Process(NamedTuple):
 
 
 def table(proc: Path = PROC) -> dict[int, Process]:
-    """Every process."""
     pids = (int(entry.name) for entry in proc.iterdir() if entry.name.isdigit())
     return {pid: process for pid in pids if (process := _process(pid, proc))}
 
@@ -54,7 +53,6 @@ def _process(pid: int, proc: Path) -> Process | None:
 
 
 def living(proc: Path = PROC) -> dict[int, Process]:
-    """Every process that is not a zombie."""
     return {pid: process for pid, process in table(proc).items() if not process.is_zombie}
 
 

@@ -154,7 +154,6 @@ class Children:
         return replace(taken, services=services)
 
     def watch_memory(self) -> None:
-        """Ends those that use more memory than they may."""
         limits = {child.name: child.memory for child in self._running.values() if child.memory and not child.used}
         found = above(limits, self.names) if limits else {}
         for pid, child in self._running.items():

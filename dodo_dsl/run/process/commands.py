@@ -78,7 +78,6 @@ class Commands:
         return folder_of(self.slot.name)
 
     def of_time(self, on_host: bool) -> Command:
-        """The command of what gives the application the test's time."""
         assert self.time is not None
         words = self.time.words(self.plan, self.time_folder, on_host=on_host)
         environment = {**base_environment(self.plan.application.access.passed), SLOT_VARIABLE: self.slot.name}

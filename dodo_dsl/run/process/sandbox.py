@@ -50,10 +50,7 @@ UMASK = 0o022
 
 
 class Sandbox:
-    """The main loop of the sandbox's process."""
-
     def __init__(self, channel: socket.socket, is_on_host: bool) -> None:
-        """One with own namespaces has loaded what services need."""
         self.channel = channel
         self.is_on_host = is_on_host
         umask = -1 if is_on_host else UMASK
@@ -79,7 +76,6 @@ class Sandbox:
         self.send(exited=name, code=code, used=used, failed=failed)
 
     def send(self, **message: object) -> None:
-        """Sends a message to the runner, if it is still there."""
         with contextlib.suppress(OSError):
             self.channel.send(json.dumps(message).encode())
 

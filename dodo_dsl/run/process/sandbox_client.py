@@ -103,7 +103,6 @@ class SandboxClient:
             self.send({"do": "start"}, (output, file.fileno()))
 
     def send(self, message: dict[str, Any], descriptors: tuple[int, ...] = ()) -> None:
-        """Sends a message with descriptors."""
         assert self._socket is not None
         try:
             socket.send_fds(self._socket, [json.dumps(message).encode()], list(descriptors))

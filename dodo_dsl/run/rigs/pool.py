@@ -55,7 +55,6 @@ def _usable(jobs: Sequence[Job]) -> list[Job]:
 
 
 def _refusal(job: Job) -> str:
-    """Why a rig cannot be used; empty if it can."""
     devices = devices_of(job.plan)
     absent = [device for device in devices if device.startswith("/") and not Path(device).exists()]
     if absent:

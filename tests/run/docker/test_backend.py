@@ -1,8 +1,7 @@
-"""What the backend makes of the ends of containers, and of cameras that they cannot have."""
+"""What the backend makes of the ends of containers."""
 
 import asyncio
 import socket
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -10,9 +9,8 @@ from typing import Any, cast
 import pytest
 from docker.errors import APIError
 
-from dodo_dsl.plan.model import Application, ApplicationService, Flag
+from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.run.docker.compose import Compose
-from dodo_dsl.run.docker.containers import unfit_camera
 from dodo_dsl.run.docker.side import ContainerSide
 from dodo_dsl.run.protocol import Event, Exited, Noted, Ready, Unstartable
 from dodo_dsl.run.sides import WatchedServices
@@ -96,14 +94,3 @@ def test_what_a_busy_engine_does_not_start_is_started_once_more(problems: tuple[
     events = in_turn(tmp_path, ("db", "healthy"), ("app", "healthy"), app=Container(*problems))[1]
     notes = [Noted(f"the container of 'app' is started once more: {SLOW}")] * (problems[0] == SLOW)
     assert events[2:] == [*notes, *[Unstartable("app", problems[-1])] * (problems != (SLOW,))]
-
-
-def test_the_camera_of_a_raspberry_pi_is_refused() -> None:
-    made = plan()
-    assert not unfit_camera(made)
-    camera, *others = made.services
-    devices = replace(camera, flags=(Flag("source", "/dev/video0"), Flag("name.argb", "rpicam")))
-    assert not unfit_camera(replace(made, services=(devices, *others)))
-    pipe = replace(camera, flags=(Flag("source", "rpicam"),))
-    said = unfit_camera(replace(made, services=(pipe, *others)))
-    assert "needs the program rpicam-vid " in said and said.endswith(": use --backend mixed or process")
