@@ -5,7 +5,7 @@ ECMA-48, section 8.3.117 (SGR), in the terminal's own palette.
 """
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from enum import IntEnum
 from typing import TextIO
 

@@ -190,8 +190,7 @@ def runner_of(
     most = max(1, min(order.capacity // min(order.need(job) for job in jobs), len(jobs)))
     at_once = f"{'up to ' * (len(jobs) > 1)}{most} at a time"
     if options.verbosity is not Verbosity.QUIET:
-        stdout.write(f"{progress.count(len(jobs))}, {at_once}, {backend} backend
-")
+        stdout.write(f"{progress.count(len(jobs))}, {at_once}, {backend} backend\n")
     shown = progress.choose(stdout, [p.slug for p in plans], options.verbosity)
     _require_possible(options, backend, plans)
     cids, nets, held = deployment.cids, subnets(deployment.subnets), (folder.lease.descriptor,)

@@ -13,7 +13,7 @@ from dodo_dsl import atomic
 from dodo_dsl.check.wiring import ANYTHING
 from dodo_dsl.outcome import Outcome, Result
 from dodo_dsl.plan.added_services import FRAMES, RECORDER
-from dodo_dsl.plan.model import Plan, PlannedService
+from dodo_dsl.plan.model import DISPLAY_SERVER, Plan, PlannedService
 from dodo_dsl.run.protocol import BackendError, Flooded, MemoryTaken, VerdictEvent
 from dodo_dsl.spec.manifest import load_manifests
 
@@ -131,9 +131,15 @@ def system_error(error: OSError) -> str:
     return f"{place}{error.strerror or error}"
 
 
-def unstartable(service: str, why: str) -> str:
-    """A sentence on a service that could not be started, and on a program that lies where the test does not see it."""
-    hint, path = "", Path(why.removesuffix(f": {os.strerror(errno.ENOENT)}"))
+def unstartable(plan: Plan, service: str, why: str) -> str:
+    """A sentence on a service that could not be started; one by its path in the application's folder is built there."""
+    programs = {own.name: own.process[0] for own in plan.application.services if own.process}
+    program = programs.get(service, "")
+    is_missing = why == f"{program}: {os.strerror(errno.ENOENT)}"
+    hint = "; build it first" if is_missing and "/" in program and not Path(program).is_absolute() else ""
+    if is_missing and program == DISPLAY_SERVER[0]:
+        hint = "; its 'display' needs Xvfb: apt install xvfb xauth"
+    path = Path(why.removesuffix(f": {os.strerror(errno.ENOENT)}"))
     if ".." in path.parts and path.exists():
         outside = Path(*path.parts[path.parts.index("..") :]).parent
         folder = outside.parent if outside.name == "bin" else outside

@@ -132,7 +132,7 @@ class RunState:
             case Malformed(service, problem):
                 self.end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)
             case Unstartable(service, why):
-                self.end("error", unstartable(service, why), service, "start")
+                self.end("error", unstartable(self.plan, service, why), service, "start")
             case Lost(why):
                 self.end("error", why)
             case Flooded():

@@ -1,9 +1,11 @@
 """From findings and verdicts to an outcome, and the sentences about it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.run.outcomes import (
     Facts,
     Finding,
@@ -13,6 +15,7 @@ from dodo_dsl.run.outcomes import (
     unstartable,
 )
 from dodo_dsl.run.protocol import VerdictEvent
+from tests.run.scripted import plan
 
 
 def verdict(name: str, passed: bool) -> VerdictEvent:
@@ -47,14 +50,32 @@ def test_exit_codes_in_words(code: int, words: str) -> None:
     assert how_it_ended(code) == words
 
 
+@pytest.mark.parametrize(
+    ("program", "why", "hint"),
+    [
+        ("build/lane", "build/lane: No such file or directory", "; build it first"),
+        ("./lane", "./lane: No such file or directory", "; build it first"),
+        ("build/lane", "build/lane: Permission denied", ""),
+        ("build/lane", "own.env: No such file or directory", ""),
+        ("lane", "lane: No such file or directory", ""),
+        ("xvfb-run", "xvfb-run: No such file or directory", "; its 'display' needs Xvfb: apt install xvfb xauth"),
+        ("/opt/lane", "/opt/lane: No such file or directory", ""),
+    ],
+)
+def test_a_program_that_is_not_there_has_to_be_built(program: str, why: str, hint: str) -> None:
+    application = Application(".", (ApplicationService("app", (program, "--fast")),))
+    sentence = unstartable(replace(plan(), application=application), "app", why)
+    assert sentence == f"service 'app' could not be started: {why}{hint}"
+
+
 def test_a_program_outside_of_what_a_test_sees_has_to_be_named(tmp_path: Path) -> None:
     program = tmp_path / "ros" / "bin" / "python"
     program.parent.mkdir(parents=True)
     (tmp_path / "app").mkdir()
     why = f"{tmp_path}/app/../ros/bin/python: No such file or directory"
-    assert "'sandbox: {read: [../ros]}'" not in unstartable("app", why)
+    assert "'sandbox: {read: [../ros]}'" not in unstartable(plan(), "app", why)
     program.touch()
-    assert unstartable("app", why).endswith("write 'sandbox: {read: [../ros]}' in dodo.yml")
+    assert unstartable(plan(), "app", why).endswith("write 'sandbox: {read: [../ros]}' in dodo.yml")
 
 
 def test_an_internal_error_leaves_its_traceback(tmp_path: Path) -> None:

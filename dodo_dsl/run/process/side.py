@@ -6,7 +6,7 @@ import functools
 import os
 import subprocess
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +24,8 @@ from dodo_dsl.run.hidden_paths import hidden_paths, own_data
 from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import Send
 from dodo_dsl.run.process import host_isolation, leftovers
-from dodo_dsl.run.process.commands import Command, Commands, needed_paths, own_modules
-from dodo_dsl.run.process.confinement import confinement
+from dodo_dsl.run.process.commands import Commands, needed_paths, own_modules
+from dodo_dsl.run.process.confinement import Command, Confinement, confinement
 from dodo_dsl.run.process.fork_server import ForkServer
 from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
@@ -200,7 +200,9 @@ class ProcessSide:
         for service in self._plan.application.services:
             with contextlib.suppress(EnvironmentProblem, IndexError):  # it is reported when the service is started
                 command = self._commands.of(service)
-                if why := application_time.refusal(service.name, command.argv[0], command.environment, command.folder):
+                if why := application_time.refusal(
+                    service.name, command.argv[0], command.environment, Path(command.folder)
+                ):
                     raise BackendError(why)
 
     def _take_of_time(self, line: bytes) -> bool:
@@ -221,9 +223,7 @@ class ProcessSide:
     def _start(self, command: Command) -> None:
         output = self._output(command)
         hidden = command.masked if self._is_on_host and self._is_apart else ()
-        words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.is_module, "masked": hidden}
-        own = {"id": command.name, "env": dict(command.environment), "confined": self._confined(command)}
-        self._sandbox.start({**own, **words}, output.writer)
+        self._sandbox.start(replace(command, masked=hidden, confined=self._confined(command)), output.writer)
         output.release_writer()
 
     def _output(self, command: Command) -> ServiceOutput:
@@ -241,7 +241,7 @@ class ProcessSide:
     def _is_confined(self) -> bool:
         return not self._is_on_host or self._is_apart
 
-    def _confined(self, command: Command) -> dict[str, Any] | None:
+    def _confined(self, command: Command) -> Confinement | None:
         """How an application's process is kept apart; None for DoDo's own services."""
         if command.layer != APPLICATION or not self._is_confined:
             return None
@@ -253,11 +253,12 @@ class ProcessSide:
             limits = replace(limits, reads=(*limits.reads, str(self._commands.time.library)))
         if command.name == BRIDGE:
             limits = replace(limits, reads=(*limits.reads, str(package_data.services())))
-        confined = confinement(command.folder, limits, hidden)
-        confined = replace(confined, channels=str(Path(self._slot.channel).parent) if self._is_on_host else "")
-        if self._gives_time:
-            confined = replace(confined, time=self._commands.time_folder)
-        return asdict(replace(confined, masked=command.masked))
+        return replace(
+            confinement(Path(command.folder), limits, hidden),
+            channels=str(Path(self._slot.channel).parent) if self._is_on_host else "",
+            time=self._commands.time_folder if self._gives_time else "",
+            masked=command.masked,
+        )
 
     @functools.cached_property
     def _hidden(self) -> list[Path]:
