@@ -89,7 +89,7 @@ def test_a_failure_says_what_where_and_which_page(tmp_path: Path, monkeypatch: p
     verdict = {"evaluator": "track", "outcome": "failed", "reason": "hit"}
     failed = replace(OUTCOME, checks=(gap, {**GAP, "name": "held"}), reason="hit wall left " * 5, verdicts=(verdict,))
     error = replace(OUTCOME, slug="e", outcome="error", reason="service 'track' ended with exit code 2")
-    stream, reported = Terminal(), Reported(tested, Path("dodo-report/test"))
+    stream, reported = Terminal(), Reported(tested, Path("dodo-report/test"), Path("dodo-report/test"))
     about = {"test": reported, "e": replace(reported, folder=Path("dodo-report/e"))}
     run_report.write_summary(stream, [error, failed, replace(failed, checks=())], [], reported=about)
     assert stream.getvalue().splitlines()[1:8] == [
