@@ -117,28 +117,6 @@ def _wrong(
     return InputError(file, what, where + inner, hint=hint)
 
 
-def entries(
-    file: Path,
-    document: object,
-    key: str,
-    kind: type[T],
-    hook: Callable[[type, Any], Any] | None = None,
-    is_wanted: Callable[[object], bool] = lambda _: True,
-) -> Iterator[T | InputError]:
-    """Each entry of a list in a document that is wanted, or what is wrong with it."""
-    try:
-        found = converted(file, converted(file, document, dict).get(key, []), list, f"$.{key}")
-    except InputError as error:
-        yield error
-        return
-    for index, entry in enumerate(found):
-        try:
-            if is_wanted(entry):
-                yield converted(file, entry, kind, f"$.{key}[{index}]", hook)
-        except InputError as error:
-            yield error
-
-
 def near(word: str, known: Iterable[str]) -> str:
     """A hint that names the known word that is spelt alike; empty if there is none."""
     close = difflib.get_close_matches(word, sorted(known), n=1, cutoff=0.7)

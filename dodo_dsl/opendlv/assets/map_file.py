@@ -18,7 +18,6 @@ from dodo_dsl.opendlv.assets.json_file import (
     Number,
     Text,
     converted,
-    entries,
     load,
     near,
     read_bytes,
@@ -211,13 +210,19 @@ def _last_of_each_frame(models: tuple[ModelEntry, ...]) -> tuple[ModelEntry, ...
 
 
 def _entries(file: Path, document: object, key: str, kind: type[Kind], report: Report) -> tuple[Kind, ...]:
-    found: list[Kind] = []
-    is_wanted = _stands if kind is not Obstacle else lambda _: True
-    for entry in entries(file, document, key, kind, partial(_resource, file.parent.resolve()), is_wanted):
-        if isinstance(entry, InputError):
-            report(entry)
-        else:
-            found.append(entry)
+    """The entries of a list in a map that stand somewhere; ``report`` gets what is wrong with others."""
+    found, hook = list[Kind](), partial(_resource, file.parent.resolve())
+    try:
+        listed = converted(file, converted(file, document, dict).get(key, []), list, f"$.{key}")
+    except InputError as error:
+        report(error)
+        return ()
+    for index, entry in enumerate(listed):
+        try:
+            if kind is Obstacle or _stands(entry):
+                found.append(converted(file, entry, kind, f"$.{key}[{index}]", hook))
+        except InputError as error:
+            report(error)
     return tuple(found)
 
 
