@@ -31,7 +31,8 @@ FAST, EVEN, SHORT, ROUNDS = 50_000, 3_000, 1_000, 5  # messages; those in real t
 CID = 126
 STATUS, END = 10, 2901
 QUIET = 3.0
-"""Seconds without a message after which nothing more is expected."""
+GATHERS = 0.005
+"""Seconds for which what listens sleeps at a time: were it woken by each message, it would hold up the player."""
 PEER = tool("cluon-replay")
 NO_PEER = "pycluon is not installed: no peer to measure against"
 
@@ -75,6 +76,7 @@ def listen(path: Path, name: str, count: int) -> Heard:
     """One play of the recording."""
     received, sampled = [], []
     with Session(CID) as session, (ours if name == "rec-replay" else theirs)(path) as player:
+        session.gather(GATHERS)
         if name == "rec-replay":
             session.send(session.messages.type("dodo.TestBegin")())
         begin = processor = 0.0

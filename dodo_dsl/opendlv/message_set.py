@@ -64,8 +64,11 @@ OWN_IDS = frozenset(_RESERVED) - frozenset(range(2910, 2920))
 """DoDo's, about a test. Beside them are messages of robots (``robot.*``), which are played and judged as all others."""
 
 
-class UnknownMessage(MessageError):
+class UnknownMessage(MessageError, KeyError):
     """A name or an id that the message set does not hold."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
 
 
 class MessageSet:

@@ -8,6 +8,7 @@ import contextlib
 import ctypes
 import errno
 import itertools
+import math
 import select
 import socket
 import struct
@@ -67,6 +68,8 @@ def _passing(encoded: bytes) -> Iterator[Instruction]:
 
 MAX_DATAGRAM_BYTES = 65_507
 CIDS = range(1, 255)
+_ROOMY = 4_000_000
+"""Bytes of a receive buffer that hold what a fast bus carries while messages gather."""
 MAX_DROPPED = 1000  # before a flood of garbage can end a wait
 _NO_ROUTE = (errno.ENODEV, errno.ENETUNREACH)
 _IP_MULTICAST_ALL = 49  # Linux: linux/in.h
@@ -112,6 +115,7 @@ class Session:
             hint = " (is there a route to 224.0.0.0/4?)" if error.errno in _NO_ROUTE else ""
             raise SessionError(f"the bus {bus[0]}:{bus[1]} cannot be joined: {error.strerror}{hint}") from None
         self._bus = bus
+        self._gathers, self._may_gather = 0.0, False
         self.hears_directly = False
         """Whether it receives what others send to its own address."""
         self._pending: dict[socket.socket, tuple[Envelope, Address]] = {}
@@ -156,6 +160,14 @@ class Session:
                 self._sender.sendto(frame, address)
         return frame
 
+    def gather(self, seconds: float) -> None:
+        """Lets messages gather after some were received, so that this process wakes once for several.
+
+        Not where the kernel grants so small a buffer that it would be full meanwhile.
+        """
+        room = self._receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+        self._gathers = seconds if room >= _ROOMY else 0.0
+
     def receive(self, timeout: float | None = 0.0) -> Envelope | None:
         """The next envelope of another member, with ``received`` set; None when ``timeout`` seconds are over.
 
@@ -170,6 +182,7 @@ class Session:
                     return None
             else:
                 if envelope is not None:
+                    self._may_gather = True
                     return envelope
             if dropped > MAX_DROPPED and deadline is not None and time.monotonic() > deadline:
                 return None
@@ -276,8 +289,12 @@ class Session:
         return envelope if self._only is None or envelope.data_type in self._only else None
 
     def _wait(self, deadline: float | None) -> bool:
-        left = None if deadline is None else deadline - time.monotonic()
-        return (left is None or left > 0) and bool(self._poll.poll(None if left is None else left * 1000))
+        left = math.inf if deadline is None else deadline - time.monotonic()
+        if left > 0 and self._may_gather and self._gathers:
+            self._may_gather = False
+            time.sleep(min(self._gathers, left))
+            return True
+        return left > 0 and bool(self._poll.poll(None if deadline is None else left * 1000))
 
 
 def datagram(envelope: Envelope) -> bytes:

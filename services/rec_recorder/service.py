@@ -20,6 +20,8 @@ FAST_LOOKS = 4
 """Looks a picture at most where the newest pictures are kept, of which none has to be exactly in time."""
 WAITING = 32_000_000
 """Bytes of pictures that wait to be encoded: 69 of 640 x 480 pixels, which take a third of a second at the end."""
+GATHERS = 0.01
+"""Seconds in which messages may gather, in real time: to wake for each one costs more than to record it."""
 MEGABYTE = 1_000_000
 
 
@@ -60,6 +62,8 @@ def build(context: Context) -> Service:
     memories = [parse(text) for text in flags["memories"]]
     recording = RecordingFile(Path(flags["rec"]), _traffic(context))
     context.resources.callback(recording.close)
+    if context.session is not None:
+        context.session.gather(GATHERS)
     cameras = _cameras(context, memories, recording) if flags["frames"] else []
     for camera in cameras:
         context.resources.callback(camera.close)

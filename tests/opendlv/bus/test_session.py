@@ -131,6 +131,16 @@ def test_the_largest_datagram_passes_and_a_larger_one_is_refused(cid: int) -> No
             one.send(IMAGE(data=bytes(MAX_DATAGRAM_BYTES)))
 
 
+def test_messages_gather_behind_one_that_came(cid: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    slept: list[float] = []
+    with Session(cid) as session, Session(cid) as other:
+        monkeypatch.setattr(time, "sleep", lambda seconds: (slept.append(seconds), other.send(STEERING())))
+        session.gather(0.05)
+        other.send(STEERING())
+        assert session.receive(5.0) is not None and slept == []
+        assert session.receive(5.0) is not None and slept == [0.05]
+
+
 def test_a_machine_without_a_route_for_multicast() -> None:
     alone = ["unshare", "--net", "--map-root-user"]
     if shutil.which("unshare") is None or subprocess.run([*alone, "true"], check=False, capture_output=True).returncode:
