@@ -8,12 +8,8 @@ import numpy as np
 from dodo_dsl.opendlv import recording_times
 from dodo_dsl.opendlv.address import IMAGE
 from dodo_dsl.opendlv.message_columns import Marks, Numbers
-from dodo_dsl.opendlv.message_set import MessageError, MessageSet, UnknownMessage
+from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import Recording, matching
-
-
-class SelectionError(ValueError):
-    """A wrong selection, or one that leaves nothing to play; one sentence."""
 
 
 @dataclass(frozen=True)
@@ -44,32 +40,24 @@ def select(
     without: Sequence[str] = (),
     camera: int | None = 0,
 ) -> Part:
-    """The part that is played, as ``recording_times.played`` has it; raises SelectionError.
+    """The part that is played, as ``recording_times.played`` has it; raises ValueError.
 
     ``messages`` (all if empty) and ``without`` name messages on the bus, ``camera`` is the sender of pictures (None for
     none). DoDo's own messages of an earlier test are never sent.
     """
     stretch, _, due = recording_times.played(recording, start, end, max_gap, timemod)
     if fault := recording_times.fault(recording, np.sort(stretch)):
-        raise SelectionError(f"{recording.path} cannot be played: {fault}")
+        raise ValueError(f"{recording.path} cannot be played: {fault}")
     index = recording.index[stretch]
     images = index["data_type"] == IMAGE
-    sent = ~images & ~_named(index, without, known)
+    sent = ~images & ~matching(index, map(known.key, without))
     if messages:
-        sent &= _named(index, messages, known)
+        sent &= matching(index, map(known.key, messages))
     shown = images & (index["sender_stamp"] == camera)
     chosen = np.flatnonzero(sent | shown)
     if not len(chosen):
-        raise SelectionError(f"{recording.path} has no message in the selected part")
+        raise ValueError(f"{recording.path} has no message in the selected part")
     return Part(stretch[chosen], due[chosen], sent[chosen], shown[chosen])
-
-
-def _named(index: np.ndarray, texts: Sequence[str], known: MessageSet) -> Marks:
-    try:
-        return matching(index, map(known.key, texts))
-    except MessageError as error:
-        hint = " (or give an id)" if isinstance(error, UnknownMessage) else ""
-        raise SelectionError(f"{error}{hint}") from None
 
 
 class Player:

@@ -18,7 +18,7 @@ from services.base import Context, Service
 from services.base.loop import TEST_BEGIN
 from services.base.pictures import Memories, memories, show
 from services.base.service import Framed, Output, period_of
-from services.rec_replay.selection import Part, Player, SelectionError, select
+from services.rec_replay.selection import Part, Player, select
 from services.rec_replay.stream import EntryStream, Pictures, first_frame
 
 LOOKS_HZ = 1000.0
@@ -145,7 +145,7 @@ def build(context: Context) -> Service:
     flags = context.flags
     recording = context.resources.enter_context(Recording(Path(flags["rec"])))
     if not len(recording):
-        raise SelectionError(f"{recording.path} is empty: there is nothing to play")
+        raise ValueError(f"{recording.path} is empty: there is nothing to play")
     if recording.damage:
         _log.warning("%s: %s", recording.path, recording.damage)
     part = _part(context, recording)

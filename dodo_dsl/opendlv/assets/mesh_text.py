@@ -1,6 +1,5 @@
 """OBJ files: their faces, and the materials of these, in one plain reader for the compiler and the services."""
 
-import functools
 import itertools
 import math
 import os
@@ -60,11 +59,7 @@ class Mesh:
 
 def read(path: Path) -> Mesh:
     """An OBJ file; raises InputError for one that is not a mesh, or has more than a mesh may have."""
-    return _mesh(path, read_bytes(path))
-
-
-@functools.lru_cache(maxsize=4)
-def _mesh(path: Path, data: bytes) -> Mesh:
+    data = read_bytes(path)
     if len(data) > MAX_BYTES:
         raise InputError(path, f"the OBJ file has {len(data)} bytes, expected at most {MAX_BYTES}")
     mesh = _parsed(path, data)

@@ -9,7 +9,7 @@ from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.recording_writer import RecordingWriter
-from services.rec_replay.selection import SelectionError, select
+from services.rec_replay.selection import select
 
 S = 1_000_000
 T0 = 1_600_000_000 * S
@@ -82,12 +82,12 @@ def test_filters_do_not_change_the_times(recording: Recording) -> None:
         ({"messages": ["1090/x"]}, "'1090/x' is not a message: expected a sender stamp, a number"),
         (
             {"without": ["opendlv.GroundSteeringRequest"]},
-            r"'opendlv.proxy.GroundSteeringRequest'\? \(or give an id\)$",
+            r"'opendlv.proxy.GroundSteeringRequest'\?",
         ),
     ],
 )
 def test_wrong_parts(recording: Recording, selection: dict[str, Any], problem: str) -> None:
-    with pytest.raises(SelectionError, match=problem):
+    with pytest.raises(ValueError, match=problem):
         chosen(recording, selection)
 
 
@@ -106,5 +106,5 @@ def test_a_recording_whose_times_cannot_be_right_is_not_played(
 ) -> None:
     for row, time in damage.items():
         recording.index["time"][row] = time
-    with pytest.raises(SelectionError, match=re.escape(f"cannot be played: {said}")):
+    with pytest.raises(ValueError, match=re.escape(f"cannot be played: {said}")):
         chosen(recording, {})
