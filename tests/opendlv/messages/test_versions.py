@@ -101,15 +101,6 @@ def test_the_set_is_told_by_its_payloads(payloads: dict[int, bytes], version: st
         assert message_versions.version_of(recording) == version
 
 
-def test_own_messages_replace_those_of_either_set(tmp_path: Path) -> None:
-    own = tmp_path / "own.odvd"
-    own.write_text("message team.Lap [id = 1140] { uint32 number; } message opendlv.sim.Frame [id = 1001] { float x; }")
-    for version in SETS:
-        messages = message_versions.load(version, own)
-        assert messages.name(1140) == "team.Lap"
-        assert messages.id("opendlv.sim.Frame") == 1001 and 1003 not in messages.ids()
-
-
 @pytest.mark.parametrize("name", ["cones-2020-05-15.rec", "sim-2023-04-27.rec", "track-1-2025-05-08.rec"])
 def test_recordings_of_others_hold_known_messages(name: str, shared_data: Callable[[str], Path]) -> None:
     with Recording(shared_data(name)) as recording:

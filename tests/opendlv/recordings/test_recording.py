@@ -93,20 +93,6 @@ def test_garbage_between_frames_is_skipped_and_told(
         assert list(recording.envelopes()) == found and recording.damage == damage
 
 
-@given(st.lists(envelopes, min_size=2, max_size=20), st.data())
-@pytest.mark.thorough
-def test_a_cut_file_gives_all_whole_frames(folder: Path, written: list[Envelope], data: st.DataObject) -> None:
-    plain = [e._replace(payload=e.payload.replace(b"\x0d", b"")) for e in written]
-    frames = [encode_frame(e) for e in plain]
-    if b"\x0d\xa4" in b"".join(frame[2:] for frame in frames):
-        return  # a number that looks like a header
-    cut = data.draw(st.integers(1, len(frames[-1]) - 1))
-    found, damage = read(write(folder, b"".join(frames[:-1]) + frames[-1][:cut]))
-    assert found == plain[:-1]
-    (place,) = damage.places
-    assert (place.offset, place.size) == (sum(map(len, frames[:-1])), cut)
-
-
 @given(st.binary(max_size=400) | st.lists(st.sampled_from([b"\x0d\xa4", b"\x00", b"\x08\x02", b"\xff"])).map(b"".join))
 @pytest.mark.thorough
 def test_any_bytes_are_read_or_skipped_once(folder: Path, data: bytes) -> None:

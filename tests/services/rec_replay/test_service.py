@@ -161,19 +161,6 @@ def test_every_message_of_real_recordings(cid: int, tmp_path: Path, shared_data:
         assert [key(e) for e in heard] == [key(e) for e in recording.envelopes(rows)]
 
 
-@pytest.mark.realtime
-@pytest.mark.proof
-def test_every_picture_of_the_track(cid: int, tmp_path: Path, shared_data: Callable[[str], Path]) -> None:
-    rec = shared_data("track-1-2025-05-08.rec")
-    names = [f"--name.{kind}=track-{os.getpid()}.{kind}" for kind in ("argb", "i420")]
-    flags = (f"--cid={cid}", f"--rec={rec}", "--timemod=30", "--settle=0", *names)
-    with Session(cid) as session, running("rec_replay", tmp_path, *flags) as process:
-        send(session, "dodo.TestBegin")
-        assert until_end(session) == []
-        process.terminate()
-        assert "could not be" not in process.communicate(timeout=PATIENCE)[1]
-
-
 @pytest.mark.parametrize(("times", "zero"), [("recorded", T0), ("test", BEGIN)])
 def test_what_cannot_be_shown_is_told_with_the_time_until_the_next_frame(times: str, zero: int, tmp_path: Path) -> None:
     """Two frames before a key frame, a damaged one, one of another size, and one of an unknown format at the end."""
