@@ -173,19 +173,12 @@ class Judged:
         yield from self._frame_lines()
 
     def _frame_lines(self) -> Iterator[dict[str, Any]]:
-        rows: list[list[Any]] = []
-        left = _BOXES_OF_A_LINE
         for time, boxes in self._frames:
             listed = [[kind, *each] for kind in ("hit", "false", "missed") for each in _shown(getattr(boxes, kind))]
             for begin in range(0, max(len(listed), 1), _BOXES_OF_A_LINE):
-                part = listed[begin : begin + _BOXES_OF_A_LINE]
-                if rows and len(part) + 1 > left:
-                    yield {"frames": rows}
-                    rows, left = [], _BOXES_OF_A_LINE
-                rows.append([time, boxes.is_known, part])
-                left -= len(part) + 1
-        if rows or self._is_cut:
-            yield {"frames": rows, **({"cut": MOST_BOXES} if self._is_cut else {})}
+                yield {"frames": [[time, boxes.is_known, listed[begin : begin + _BOXES_OF_A_LINE]]]}
+        if self._is_cut:
+            yield {"frames": [], "cut": MOST_BOXES}
 
 
 def finite(value: float | None) -> float | None:

@@ -26,7 +26,6 @@ VARIABLE = "DODO_SENDERS"
 END_OF_INPUT, NOT_SHOWN = "dodo.EndOfInput", "dodo.NotShown"
 RUNNER_ONLY = {"dodo.TestBegin": RUNNER, "dodo.LinesRead": RUNNER, "dodo.Alive": HEARTBEAT}
 """Messages of the runner, with the name of the address from which they come."""
-_MOST_NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -42,12 +41,8 @@ class Producers:
         """Why a test fails in which the application sent the message."""
         if self.services == (LINES,):
             return f"the application sent {self.message}, which it declares to print (x-dodo: lines)"
-        *others, last = [f"'{name}'" for name in self.services] or [""]
-        who = f"only {', '.join(others)} and {last} may send" if others else f"only {last} may send"
-        if not self.services:
-            who = "no service of this test sends"
-        elif len(self.services) > _MOST_NAMED:
-            who = "only services of the test may send"
+        only = " and ".join(f"'{name}'" for name in self.services)
+        who = f"only {only} may send" if only else "no service of this test sends"
         return f"the application sent {self.message}, which {who}"
 
 

@@ -13,7 +13,6 @@ from services.base.evaluator import EARLY, Hidden
 from services.base.judged import FAILED, WARNED
 from services.base.service import said
 from services.continuous_signal.measures import (
-    Coverage,
     LateFacts,
     LateSamples,
     SignalLimits,
@@ -23,12 +22,21 @@ from services.continuous_signal.measures import (
 )
 from services.continuous_signal.target import Target, Times, Values, in_order
 
-_NAMES = {
-    "mean": "the mean distance",
-    "std": "the standard deviation",
-    "distance": "the largest distance",
-    "mean-over-time": "the mean distance over time",
-    "std-over-time": "the standard deviation over time",
+_FAULTS = {
+    "mean": "the mean distance is {value} ({bound})",
+    "std": "the standard deviation is {value} ({bound})",
+    "distance": "the largest distance is {value} ({bound})",
+    "mean-over-time": "the mean distance over time is {value} ({bound})",
+    "std-over-time": "the standard deviation over time is {value} ({bound})",
+    "share": "the share of time within {width} of the target is {value} ({bound})",
+    "frame-share": "the share of frames within {width} of the target is {value} ({bound}){unanswered}",
+    "sign-share": "the share of frames with the sign of the target is {value} ({bound}){unanswered}",
+    "lag": "it lags its target by {value} s ({bound} s)",
+    "repeats": "{value} samples in a row have the same value, {run.value:z.4g}, from {run.time:.2f} s on ({bound})",
+    "samples": "only {value} samples came ({bound}){outside}",
+    "gap": "nothing came between {held.gap_begin:.2f} s and {held.gap_end:.2f} s ({bound} s)",
+    "coverage": "the samples cover {value} of the time from {held.begin:.2f} s to {held.end:.2f} s ({bound})",
+    "broken": "{value} samples are not finite numbers, the first at {first_broken:.2f} s",
 }
 _KEPT = ("mean", "std", "distance", "share", "frame-share", "sign-share")
 _AT_ONCE = {"mean-over-time": "mean", "std-over-time": "std"}
@@ -71,44 +79,24 @@ def _nothing(signal: str, target: Target, measures: SignalMeasures, during: str,
 
 
 def _fault(check: Check, measures: SignalMeasures, limits: SignalLimits) -> str:
-    value, bound = check.told, check.bound
-    if check.name == "samples":
-        aside = f", and {measures.outside} outside the target's time" if measures.outside else ""
-        return f"only {value} samples came ({bound}){aside}"
-    if check.name == "broken":
-        return f"{value} samples are not finite numbers, the first at {measures.broken[0]:.2f} s"
-    if check.name == "lag":
-        return f"it lags its target by {value} s ({bound} s)"
-    if check.name == "repeats":
-        which = f", {said(measures.repeats.value)}, from {measures.repeats.time:.2f} s on" if measures.repeats else ""
-        return f"{value} samples in a row have the same value{which} ({bound})"
-    if check.name == "share":
-        return f"the share of time within {_width(limits)} of the target is {value} ({bound})"
-    if check.name in ("frame-share", "sign-share"):
-        what = (
-            f"within {_width(limits)} of the target" if check.name == "frame-share" else "with the sign of the target"
-        )
-        aside = f", and {measures.unanswered} had no sample" if measures.unanswered else ""
-        return f"the share of frames {what} is {value} ({bound}){aside}"
-    if check.name in ("gap", "coverage"):
-        return _hole(check, measures.coverage)
-    return f"{_NAMES[check.name]} is {value} ({bound})"
+    if check.value is None:
+        return f"{check.name} has no value ({check.bound})"
+    return _FAULTS[check.name].format(
+        value=check.told,
+        bound=check.bound,
+        width=_width(limits),
+        run=measures.repeats,
+        held=measures.coverage,
+        first_broken=min(measures.broken, default=0.0),
+        outside=f", and {measures.outside} outside the target's time" if measures.outside else "",
+        unanswered=f", and {measures.unanswered} had no sample" if measures.unanswered else "",
+    )
 
 
 def _width(limits: SignalLimits) -> str:
     if limits.band is None or not limits.relative:
         return said(limits.band)
     return f"{limits.band * 100:.4g} %" + (f" or {said(limits.floor)}" if limits.floor else "")
-
-
-def _hole(check: Check, coverage: Coverage | None) -> str:
-    bound = check.bound
-    if coverage is None:
-        return f"{check.name} has no value ({bound})"
-    if check.name == "gap":
-        return f"nothing came between {coverage.gap_begin:.2f} s and {coverage.gap_end:.2f} s ({bound} s)"
-    judged = f"the time from {coverage.begin:.2f} s to {coverage.end:.2f} s"
-    return f"the samples cover {check.told} of {judged} ({bound})"
 
 
 def _late(late: LateFacts, begin: str = "; left out: ") -> str:

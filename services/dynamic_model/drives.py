@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from services.dynamic_model.model import STEERING, BodyMotion, Reading, limited, speed_and_steering
+from services.dynamic_model.model import STEERING, BodyMotion, KiwiDrive, Reading, limited, speed_and_steering
 
 GRAVITY = 9.81  # m/s2
 LEFT, RIGHT = "left", "right"
@@ -178,3 +178,6 @@ class BicycleDrive:
         most = self.car.max_acceleration if pushes else self.car.max_braking
         given = limited(wanted, most) * (self.power if pushes else 1.0)
         return limited(given, self.car.friction * GRAVITY)
+
+
+Drive = KiwiDrive | DifferentialDrive | BicycleDrive

@@ -8,10 +8,13 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 from dodo_dsl.opendlv.assets.car import KIWI, Car
 from dodo_dsl.opendlv.envelope import MICROSECONDS
+
+if TYPE_CHECKING:
+    from services.dynamic_model.drives import Drive
 
 LONGEST = 5_000
 """Microseconds: no step of the equations is longer, however seldom the model is updated."""
@@ -75,27 +78,6 @@ class Reading(NamedTuple):
     value: float
 
 
-class Drive(Protocol):
-    """What moves: a drive holds what its actuators were asked for, in SI units, and goes on in time."""
-
-    @property
-    def rest(self) -> Mapping[str, float]:
-        """Its actuators, each with what it is asked for at rest."""
-
-    def accepted(self, actuator: str, request: float) -> float:
-        """What an actuator makes of a request: scaled and limited."""
-
-    def following(self, motion: BodyMotion) -> Mapping[str, float]:
-        """What its actuators are asked for so that the body moves so, as far as the drive can."""
-
-    def step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
-        """The motion `dt` seconds later, with the actuators asked for the same all the time."""
-
-    def reset(self) -> None: ...
-
-    def odometry(self, motion: BodyMotion, asked: Mapping[str, float]) -> tuple[Reading, ...]: ...
-
-
 def speed_and_steering(speed: float, wheel: float) -> tuple[Reading, Reading]:
     """The odometry of a car that steers: m/s over ground, and the front wheel's angle in rad."""
     by_name = (("GroundSpeed", "groundSpeed", speed), ("GroundSteering", "groundSteering", wheel))
@@ -105,16 +87,18 @@ def speed_and_steering(speed: float, wheel: float) -> tuple[Reading, Reading]:
 
 @dataclass(frozen=True)
 class KiwiDrive:
-    """The single track of the public Kiwi simulation."""
+    """The single track of the public Kiwi simulation; as all drives, it is asked in SI units and goes on in time."""
 
     car: Car = KIWI
     offset: float = 0.0
 
     @property
     def rest(self) -> Mapping[str, float]:
+        """Its actuators, each with what it is asked for at rest."""
         return {STEERING: self.offset, PEDAL: 0.0}
 
     def accepted(self, actuator: str, request: float) -> float:
+        """What an actuator makes of a request: scaled and limited."""
         if actuator == STEERING:
             return limited(self.car.steering_gain * request, self.car.steering_limit) + self.offset
         return self._pedal(request)
@@ -145,7 +129,7 @@ class KiwiDrive:
 class Vehicle:
     """The car through test time: it holds its last requests and advances only in `update`."""
 
-    def __init__(self, drive: Drive, latency: float = 0.0) -> None:
+    def __init__(self, drive: "Drive", latency: float = 0.0) -> None:
         """`latency` in s from a request to its effect, counted from the update before the request."""
         self.motion = BodyMotion()
         self.drive = drive

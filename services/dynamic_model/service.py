@@ -17,10 +17,11 @@ from services.dynamic_model.drives import (
     SPEED,
     BicycleDrive,
     DifferentialDrive,
+    Drive,
     SingleTrack,
     TwoWheels,
 )
-from services.dynamic_model.model import PEDAL, STEERING, BodyMotion, Drive, KiwiDrive, Vehicle
+from services.dynamic_model.model import PEDAL, STEERING, BodyMotion, KiwiDrive, Vehicle
 
 RESET = "reset"
 _CAR_ACCELERATION = 3.5

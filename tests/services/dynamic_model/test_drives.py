@@ -13,10 +13,11 @@ from services.dynamic_model.drives import (
     SPEED,
     BicycleDrive,
     DifferentialDrive,
+    Drive,
     SingleTrack,
     TwoWheels,
 )
-from services.dynamic_model.model import STEERING, BodyMotion, Drive, Vehicle
+from services.dynamic_model.model import STEERING, BodyMotion, Vehicle
 from services.integrator.model import BodyPose, Integrator, Twist
 
 SECOND = 1_000_000
