@@ -1,4 +1,4 @@
-"""The agent over its two FIFOs (``native/agent.c``). In a container the application may write there, too."""
+"""What lets the application's time go on (``native/agent.c``). In a container the application may write there, too."""
 
 import os
 import select

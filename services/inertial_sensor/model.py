@@ -120,10 +120,6 @@ class InertialModel:
         """Where the sensor is in the world, in m."""
         return plus(position, turned(body, self._lever))
 
-    def heading(self, body: Matrix) -> float:
-        """Where the body looks, counter-clockwise from the world's x axis, in rad."""
-        return math.atan2(body[1][0], body[0][0])
-
 
 def magnetic_field(strength: float, inclination: float, declination: float, north: float) -> Vector:
     """The earth's field in the world: so strong (T), so far below the horizon and east of north (rad).

@@ -65,8 +65,8 @@ class InertialSensor(Service):
         x, y, z = self._model.place(body, position)
         east, north, up = (chance.gauss(0.0, self._flags["position-noise"]) for _ in range(3))
         latitude, longitude, altitude = self._origin.geolocation((x, y, z + up), east, north)
-        angle = self._model.heading(body) + chance.gauss(0.0, math.radians(self._flags["heading-noise"]))
-        heading = self._origin.heading(angle)
+        noise = chance.gauss(0.0, math.radians(self._flags["heading-noise"]))
+        heading = self._origin.heading(math.atan2(body[1][0], body[0][0]) + noise)
         return self._type(_PLACE)(latitude=latitude, longitude=longitude, altitude=altitude, heading=heading)
 
     def _take_frame(self, frame: Any, _sample_time: int) -> None:

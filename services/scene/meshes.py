@@ -1,7 +1,11 @@
 """OBJ files as triangles: welded, solids of revolution with fewer sides, and in the colours of their materials."""
 
+import importlib
+import sys
+from functools import cache
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -63,10 +67,20 @@ def with_fewer_sides(vertices: Array, triangles: Indices) -> tuple[Array, Indice
     return weld(np.column_stack([directions * profile[:, :1] + middle[:2], profile[:, 1]]), triangles)
 
 
-def _mesh(vertices: Array, triangles: Indices) -> Any:
-    from services.scene.mesh_library import trimesh
+@cache
+def _trimesh() -> Any:
+    """Loaded without scipy, which OBJ files do not need and which takes longer to load than all else together."""
+    without = {"scipy"} - {*sys.modules}
+    sys.modules.update(dict.fromkeys(without, cast(ModuleType, None)))  # it does without what cannot be imported
+    try:
+        return importlib.import_module("trimesh")
+    finally:
+        for name in without:
+            del sys.modules[name]
 
-    return trimesh.Trimesh(vertices, triangles, process=False)
+
+def _mesh(vertices: Array, triangles: Indices) -> Any:
+    return _trimesh().Trimesh(vertices, triangles, process=False)
 
 
 def is_closed(vertices: Array, triangles: Indices) -> bool:
