@@ -7,7 +7,7 @@ import stat
 import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, NoReturn
@@ -65,8 +65,9 @@ def run(folder: Path, build: Build, clock: Clock | None = None) -> int:
     level = logging.DEBUG if flags["verbose"] else logging.INFO
     logging.basicConfig(stream=sys.stderr, level=level, format=f"{name}: %(levelname)s: %(message)s")
     role = os.environ.get("DODO_SERVICE") or name
-    with _signals() as stop, connected(channel(), role):
-        return _serve(role, manifest, folder, build, flags, clock, stop)
+    signals: list[int] = []
+    with _handled(lambda number, _: signals.append(number)), connected(channel(), role):
+        return _serve(role, manifest, folder, build, flags, clock, lambda: bool(signals))
 
 
 def main(file: str, build: Build, clock: Clock | None = None) -> NoReturn:
@@ -74,26 +75,13 @@ def main(file: str, build: Build, clock: Clock | None = None) -> NoReturn:
     sys.exit(run(Path(file).parent, build, clock))
 
 
-IsStopped = Callable[[], bool]
-
-
-@contextmanager
-def _signals() -> Iterator[IsStopped]:
-    """Whether a signal has asked the service to stop."""
-    requests: list[int] = []
-    with _handled(lambda number, _: requests.append(number)):
-        yield lambda: bool(requests)
-
-
-@contextmanager
-def interruptible() -> Iterator[None]:
+def interruptible() -> AbstractContextManager[None]:
     """A signal ends the service at once with code 0, and closes its resources; only in the main thread."""
 
     def leave(_number: int, _frame: object) -> None:
         raise SystemExit(0)
 
-    with _handled(leave):
-        yield
+    return _handled(leave)
 
 
 @contextmanager

@@ -75,23 +75,15 @@ class FileCamera:
 
 
 def repeated(path: Path) -> Iterator[Image]:
-    """The pictures of a file, as B, G, R, again and again; none of one that has none."""
-    picture = still(path)
-    if picture is not None:
-        yield from repeat(picture)
+    """The pictures of a file, as B, G, R, again and again; none of one that has none. Raises InputError."""
+    if cv2.haveImageReader(str(path)):
+        yield from repeat(load_picture(path))
     is_there = True
     while is_there:
         is_there = False
         for picture in recorded(path) if path.suffix == RECORDING else filmed(path):
             is_there = True
             yield picture
-
-
-def still(path: Path) -> Image | None:
-    """The picture of an image file, None for other files; raises InputError."""
-    if not cv2.haveImageReader(str(path)):
-        return None
-    return load_picture(path)
 
 
 def filmed(path: Path) -> Iterator[Image]:

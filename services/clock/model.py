@@ -73,7 +73,7 @@ class Stepper:
         self._deliver([begin._replace(sample_time=EPOCH, received=0)], "")
         while not self.stopped():
             self.application.expect(self.now)
-            going = self._go_each((*self.roles.advance, *self.roles.sense))
+            going = [done for name in (*self.roles.advance, *self.roles.sense) for done in self._go((name,), self.now)]
             if self._is_over():
                 return
             self.application.show([result for result in going if result.pictures], self.now)
@@ -118,9 +118,6 @@ class Stepper:
             self._await(judging)
             self.reached = self._judging_at
         return set(self.roles.judge) <= self._ended
-
-    def _go_each(self, names: Sequence[str]) -> list[Done]:
-        return [result for name in names for result in self._go((name,), self.now)]
 
     def _go(self, names: Sequence[str], until: int) -> list[Done]:
         """Let services go on to a time (us); raises ServiceSilent."""
