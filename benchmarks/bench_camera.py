@@ -36,7 +36,7 @@ from services.scene.raster import Image
 from services.scene.render import Renderer
 from services.scene.scene import SceneOptions, load_scene
 from services.scene.shading import Light
-from services.scene.truth import SceneTruth, TruthLimits, classes_of
+from services.scene.truth import SceneTruth, classes_of
 from services.virtual_camera.optics import Optics, Sensor
 
 SIZE, FOVY = (1280, 720), math.radians(48.8)
@@ -203,7 +203,7 @@ def condition(folder: Path, name: str) -> Callable[[CameraPose], object]:
     options, parts = CONDITIONS[name]
     optics = Optics(Pinhole(*SIZE, FOVY), **parts)  # type: ignore[arg-type]
     renderer = Renderer(load_scene(folder, options), optics.wide.width, optics.wide.height, optics.wide.fovy)
-    truth = SceneTruth(renderer, classes_of([], renderer.bodies.names), TruthLimits()) if name == "boxes" else None
+    truth = SceneTruth(renderer, classes_of([], renderer.bodies.names), 0.25, 4.0) if name == "boxes" else None
     out = np.empty((SIZE[1], SIZE[0], 4), np.uint8)
 
     def draw(pose: CameraPose) -> None:

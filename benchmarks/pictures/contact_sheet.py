@@ -15,7 +15,7 @@ from services.scene.raster import Image
 from services.scene.render import Renderer
 from services.scene.scene import SceneOptions, load_scene
 from services.scene.shading import Light
-from services.scene.truth import SceneTruth, TruthLimits, classes_of
+from services.scene.truth import SceneTruth, classes_of
 from services.virtual_camera.optics import Optics, Sensor
 
 MAP = package_data.registry() / "maps" / "left-curve"
@@ -39,7 +39,7 @@ SHEET: dict[str, tuple[SceneOptions, dict[str, object]]] = {
 
 
 def draw_boxes(picture: Image, renderer: Renderer) -> None:
-    truth = SceneTruth(renderer, classes_of([], renderer.bodies.names), TruthLimits())
+    truth = SceneTruth(renderer, classes_of([], renderer.bodies.names), 0.25, 4.0)
     for box in truth.boxes(PLACE):
         corner, end = (box.left, box.top), (box.left + box.width, box.top + box.height)
         cv2.rectangle(picture, [round(v) - 1 for v in corner], [round(v) for v in end], (40, 40, 255, 255))

@@ -60,8 +60,6 @@ def build(context: Context) -> Service:
     flags = context.flags
     freq, shared = flags["freq"], memories(context, flags["width"], flags["height"])
     camera = open_camera(flags)
-    for note in getattr(camera, "notes", ()):
-        context.log.warning("%s", note)
     if isinstance(camera, FileCamera):
         context.resources.callback(camera.close)
         return RigCameraService(camera, shared, freq)

@@ -182,12 +182,12 @@ MANUAL = 1
 EXPOSURE_UNIT = 1e-4
 """V4L2_CID_EXPOSURE_ABSOLUTE counts in 100 us."""
 TOLERANCE = 0.1
-"""Share by which exposure and rate may differ from what was asked for."""
+"""Share by which the exposure may differ from what was asked for."""
 PATIENCE = 2.0
 
 
 class V4l2Camera:
-    """``read`` waits for a picture; ``notes`` name a rate other than asked for."""
+    """``read`` waits for a picture."""
 
     def __init__(self, device: Path, width: int, height: int, freq: float, exposure: float) -> None:
         """``freq`` in Hz, ``exposure`` in s.
@@ -218,9 +218,6 @@ class V4l2Camera:
         except ValueError:
             self._capture.release()
             raise
-        rate = self._capture.get(cv2.CAP_PROP_FPS)
-        differs = abs(rate - freq) > TOLERANCE * freq
-        self.notes = [f"{device} refuses the rate of {freq:g} Hz and has {rate:g}"] if differs else []
 
     def read(self) -> SharedPicture:
         """The next picture, with the time at which it was complete; raises CameraError when the device is lost."""

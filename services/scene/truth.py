@@ -36,14 +36,6 @@ class TrueBox:
     visible: float
 
 
-@dataclass(frozen=True)
-class TruthLimits:
-    """The least for a box: the smallest visible share, and the smallest height in pixels."""
-
-    visible: float = 0.25
-    height: float = 4.0
-
-
 def classes_of(written: Iterable[str], models: Iterable[str]) -> dict[str, str]:
     """Classes by model, of words such as ``cone_yellow=yellow``; each model's own name if nothing is written.
 
@@ -61,9 +53,10 @@ class SceneTruth:
     """Finds the boxes of named models in pictures of a renderer, as a lens in front of it shows them."""
 
     def __init__(
-        self, renderer: Renderer, classes: Mapping[str, str], limits: TruthLimits, lens: Lens | None = None
+        self, renderer: Renderer, classes: Mapping[str, str], visible: float, height: float, lens: Lens | None = None
     ) -> None:
-        self.renderer, self.classes, self._limits, self._lens = renderer, classes, limits, lens
+        """A box has at least this visible share, and this height in pixels."""
+        self.renderer, self.classes, self._visible, self._height, self._lens = renderer, classes, visible, height, lens
         self.camera = lens.camera if lens else renderer.camera
 
     def boxes(self, pose: CameraPose) -> list[TrueBox]:
@@ -86,10 +79,10 @@ class SceneTruth:
             corners, share = _cut(self._lens.shown(corners - 0.5) + 0.5, self._lens.camera)
             inside *= share
         (left, top), (wide, high) = corners.min(axis=0).tolist(), np.ptp(corners, axis=0).tolist()
-        if high < self._limits.height or wide <= 0.0:
+        if high < self._height or wide <= 0.0:
             return None
         visible = min(seen / max(_alone(pieces, mask), 1) * inside, 1.0)
-        if visible < self._limits.visible:
+        if visible < self._visible:
             return None
         return TrueBox(body, name, left, top, wide, high, visible)
 
@@ -156,8 +149,7 @@ class TruthSender:
 def open_truth(flags: Flags, renderer: Renderer, lens: Lens | None) -> SceneTruth:
     """What knows the true boxes; raises ValueError for a model that the map lacks."""
     classes = classes_of(flags["truth-classes"], renderer.bodies.names)
-    limits = TruthLimits(flags["truth-min-visible"], flags["truth-min-height"])
-    return SceneTruth(renderer, classes, limits, lens)
+    return SceneTruth(renderer, classes, flags["truth-min-visible"], flags["truth-min-height"], lens)
 
 
 def truth_sender(context: Context, renderer: Renderer, lens: Lens | None) -> TruthSender | None:

@@ -46,7 +46,6 @@ def opened(monkeypatch: pytest.MonkeyPatch, fixed: dict[int, float]) -> Capture:
 def test_settings_are_set_and_the_camera_is_unplugged(monkeypatch: pytest.MonkeyPatch) -> None:
     capture = opened(monkeypatch, {})
     camera = V4l2Camera(DEVICE, 64, 48, 10, 0.1)
-    assert camera.notes == []
     assert capture.get(cv2.CAP_PROP_EXPOSURE) == 1000
     assert capture.get(cv2.CAP_PROP_AUTO_EXPOSURE) == 1
     assert camera.read().argb.shape == camera.read().argb.shape == (48, 64, 4)

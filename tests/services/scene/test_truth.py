@@ -10,18 +10,18 @@ from services.scene.camera import CameraPose, Pinhole, still
 from services.scene.lens import Distortion, Lens
 from services.scene.render import Renderer
 from services.scene.scene import load_scene
-from services.scene.truth import SceneTruth, TrueBox, TruthLimits, classes_of
+from services.scene.truth import SceneTruth, TrueBox, classes_of
 from services.virtual_camera.optics import Optics
 
 STRAIGHT = package_data.registry() / "maps" / "straight"
 FOVY = math.radians(48.8)
 FOCAL = 240 / math.tan(FOVY / 2)
-ALL = TruthLimits(0.0, 0.0)
+ALL = (0.0, 0.0)
 
 
 def boxes(folder, pose, limits=ALL, classes=(), options=None, size=(640, 480)):
     renderer = Renderer(load_scene(folder, options), *size, FOVY)
-    return SceneTruth(renderer, classes_of(classes, renderer.bodies.names), limits).boxes(pose)
+    return SceneTruth(renderer, classes_of(classes, renderer.bodies.names), *limits).boxes(pose)
 
 
 def edges(box: TrueBox) -> tuple[float, ...]:
@@ -38,7 +38,7 @@ def straight():
 @pytest.mark.thorough
 def test_a_box_holds_the_projection_of_all_corners(straight, x, y, z, pitch, yaw):
     """Any camera without roll: each box is that of the model's corners by the pinhole equation, cut at the edges."""
-    for box in SceneTruth(straight, classes_of([], straight.bodies.names), ALL).boxes(
+    for box in SceneTruth(straight, classes_of([], straight.bodies.names), *ALL).boxes(
         CameraPose.at(x, y, z, pitch=pitch, yaw=yaw)
     ):
         dx, dy, dz = (straight.bodies.outline(box.number)[0] - [x, y, z]).T
@@ -62,9 +62,7 @@ def test_what_hides_a_model_takes_from_its_visible_share(cube_at):
     assert far.visible == pytest.approx(0.5, abs=0.03)
     whole = (320 - FOCAL * 0.5 / 3.5, 320 + FOCAL * 0.5 / 3.5)
     assert edges(far)[:2] == pytest.approx(whole, abs=0.01)
-    assert [
-        box.number for box in boxes(cube_at([4, 0, 0, 0], near), CameraPose.at(0, 0, 0.5), TruthLimits(0.6, 0))
-    ] == [1]
+    assert [box.number for box in boxes(cube_at([4, 0, 0, 0], near), CameraPose.at(0, 0, 0.5), (0.6, 0))] == [1]
 
 
 def test_a_cut_model_has_a_cut_box_and_the_share_that_is_inside(cube_at):
@@ -73,7 +71,7 @@ def test_a_cut_model_has_a_cut_box_and_the_share_that_is_inside(cube_at):
     assert box.left == 0
     assert box.width == pytest.approx(320 - FOCAL * (left - 0.5) / 3, abs=0.01)  # its far right edge, at 3 m
     assert box.visible < 0.7
-    assert boxes(cube_at([2.5, left, 0, 0]), CameraPose.at(0, 0, 0.5), TruthLimits(0.8, 0)) == []
+    assert boxes(cube_at([2.5, left, 0, 0]), CameraPose.at(0, 0, 0.5), (0.8, 0)) == []
 
 
 def test_classes_are_those_written_or_the_models_own_names():
@@ -94,7 +92,7 @@ def test_through_a_lens_boxes_are_where_the_lens_shows_the_models(cube_at, k1):
     out, pose = np.empty((480, 640, 4), np.uint8), CameraPose.at(0, 0, 0.3)
     optics.expose(renderer, still(pose), CameraPose.at(0, 0, 0), 0, out)
     red = (out[..., 2] > 100) & (out[..., 0] < 60)
-    found = SceneTruth(renderer, {"cube": "cube"}, ALL, optics.lens).boxes(pose)
+    found = SceneTruth(renderer, {"cube": "cube"}, *ALL, optics.lens).boxes(pose)
     assert len(found) == 2
     for box in found:
         side = slice(0, 320) if box.left < 320 else slice(320, 640)

@@ -10,7 +10,7 @@ import numpy as np
 from services.scene.camera import CameraPose
 from services.scene.render import Renderer
 from services.scene.scene import SceneOptions, load_scene
-from services.scene.truth import SceneTruth, TruthLimits
+from services.scene.truth import SceneTruth
 from tests.services.map_folders import CUBE
 
 WEDGE = "v 0.1 0.2 0\nv -0.1 0.2 0\nv 0 -0.3 0\nv 0 0.2 0.3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
@@ -61,11 +61,11 @@ def test_a_model_at_a_frame_looks_like_one_that_stands_there(write_map: Write) -
 
 def test_true_boxes_move_along(write_map: Write) -> None:
     it = renderer(write_map, model("cube", instances=[[3, 0.8, 0, 0]]), model(frames=[7]))
-    truth = SceneTruth(it, {"car": "car", "cube": "cube"}, TruthLimits())
+    truth = SceneTruth(it, {"car": "car", "cube": "cube"}, 0.25, 4.0)
     assert [box.name for box in truth.boxes(EYE)] == ["cube"]
     for spot in SPOTS:
         drive(it, 7, *spot)
         still = renderer(write_map, model("cube", instances=[[3, 0.8, 0, 0]]), model(instances=[standing(*spot)]))
-        assert truth.boxes(EYE) == SceneTruth(still, {"car": "car", "cube": "cube"}, TruthLimits()).boxes(EYE)
+        assert truth.boxes(EYE) == SceneTruth(still, {"car": "car", "cube": "cube"}, 0.25, 4.0).boxes(EYE)
     drive(it, 7, -3.0, 0.0, 0.0, 0.0)
     assert [box.name for box in truth.boxes(EYE)] == ["cube"]
