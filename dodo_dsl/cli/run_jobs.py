@@ -79,7 +79,12 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
 
 def load_compiled(folder: Path, settings: Settings) -> Plan:
     """The Plan of a compiled test, whose clock and isolation are settled, and whose files are those that it needs."""
-    plan = _load_plan(folder, settings)
+    try:
+        plan = from_json(regular_file.text(folder / PLAN_FILE), settings)
+    except OSError as error:
+        raise UsageError(f"there is no compiled test at '{folder}': {error.strerror}") from error
+    except (PlanError, UnicodeDecodeError) as error:
+        raise UsageError(f"{folder / PLAN_FILE}: {error}") from error
     if problem := file_problem(folder.resolve(), plan.shared):
         raise UsageError(f"{plan.name}: {problem}")
     if settings.clock not in (None, plan.clock):
@@ -114,15 +119,6 @@ def _is_written_by_dodo(file: Path) -> bool:
         return regular_file.text(file).startswith(("*\n", '{\n  "dodo": "results"'))
     except (OSError, ValueError):
         return False
-
-
-def _load_plan(folder: Path, settings: Settings) -> Plan:
-    try:
-        return from_json(regular_file.text(folder / PLAN_FILE), settings)
-    except OSError as error:
-        raise UsageError(f"there is no compiled test at '{folder}': {error.strerror}") from error
-    except (PlanError, UnicodeDecodeError) as error:
-        raise UsageError(f"{folder / PLAN_FILE}: {error}") from error
 
 
 def compile_tests(

@@ -6,7 +6,6 @@ It shows everything without its script, which searches and filters.
 import base64
 import functools
 import hashlib
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -34,8 +33,6 @@ class LinkedFiles(NamedTuple):
 Past = Mapping[str, Sequence[tuple[str, str]]]
 """The latest runs by a test's slug, the latest last: each one's outcome, and a sentence on it."""
 NO_PAST: Past = {}
-_INDENT = re.compile(r"\n +(?=<)")
-"""Of tags: text of others has none, and a page with many tests has thousands."""
 _MOST_TEXT = 10_000
 """Characters of one text of others on the page."""
 _MOST_OF_A_LINE = 56
@@ -51,30 +48,26 @@ def render(
 ) -> str:
     """The page, with files by slug; with a comparison, what changed since that report."""
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
-    page = (
-        _environment()
-        .get_template("report.html.j2")
-        .render(
-            outcomes=outcomes,
-            families=sorted(families(outcomes), key=lambda family: family.urgency),
-            files=files,
-            past=past,
-            checks=checks,
-            check_of=check_of,
-            longest=_MOST_OF_A_LINE,
-            taken_s=sum((o.setup_s or 0.0) + (o.execution_s or 0.0) for o in outcomes),
-            counts=counts,
-            not_run=circumstances.not_run,
-            runs=circumstances.runs,
-            version=__version__,
-            comparison=comparison,
-            kinds=KINDS,
-            script=_text("report/suite.js"),
-            style=_text("viewer/tokens.css") + _text("report/suite.css"),
-            hash=source_hash,
-        )
+    template = _environment().get_template("report.html.j2")
+    return template.render(
+        outcomes=outcomes,
+        families=sorted(families(outcomes), key=lambda family: family.urgency),
+        files=files,
+        past=past,
+        checks=checks,
+        check_of=check_of,
+        longest=_MOST_OF_A_LINE,
+        taken_s=sum((o.setup_s or 0.0) + (o.execution_s or 0.0) for o in outcomes),
+        counts=counts,
+        not_run=circumstances.not_run,
+        runs=circumstances.runs,
+        version=__version__,
+        comparison=comparison,
+        kinds=KINDS,
+        script=_text("report/suite.js"),
+        style=_text("viewer/tokens.css") + _text("report/suite.css"),
+        hash=source_hash,
     )
-    return _INDENT.sub("\n", page)
 
 
 @functools.cache

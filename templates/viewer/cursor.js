@@ -32,18 +32,17 @@ dodo.cursor = (function () {
       if (now >= last) pause();
     };
     frame = requestAnimationFrame(step);
-    tell();
+    changed(true);
   }
 
   function pause() {
     cancelAnimationFrame(frame);
     frame = null;
     link();
-    tell();
+    changed(false);
   }
 
-  let tellState = () => {};
-  const tell = () => tellState(frame !== null);
+  let changed = () => {};
 
   function linked() {
     const found = /^#t=(\d+(?:\.\d*)?)$/.exec(location.hash);
@@ -65,6 +64,6 @@ dodo.cursor = (function () {
     toggle: () => (frame === null ? play() : pause()),
     setSpeed: (value) => (speed = value),
     follow: (follower) => followers.push(follower),
-    whenPlaying: (state) => (tellState = state),
+    whenPlaying: (state) => (changed = state),
   };
 })();
