@@ -18,24 +18,11 @@ from dodo_dsl.spec.model import Goal
 from tests.contributing import results_schema
 from tests.report.test_report_folder import OUTCOME
 
-
-@pytest.mark.parametrize("text", ["", "[]", '{"dodo": "results", "version": 1, "tests": [3]}', "[" * 100_000])
-def test_other_files_are_not_results(tmp_path: Path, text: str) -> None:
-    (tmp_path / "results.json").write_text(text)
-    with pytest.raises(results.ResultsError):
-        results.load(tmp_path / "results.json")
-
-
 STRANGE = [
     {"slug": 3},
-    {"slug": ["a"]},
     {"outcome": "maybe"},
-    {"checks": 3},
     {"reason": "\ud800"},
-    {"machine": 3},
     {"machine": {}},
-    {"resources": [{"service": "a"}]},
-    {"goals": [{"check": "time"}]},
     {"goals": [{"check": "time", "zero": 1, "one": 1, "weight": 1}]},
     {"goals": [{"check": "time", "zero": math.nan, "one": 1, "weight": 1}]},
     {"goals": [{"check": "time", "zero": 0, "one": 1, "weight": 1e308}]},
