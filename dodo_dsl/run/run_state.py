@@ -10,8 +10,7 @@ from dodo_dsl.outcome import ON_EMULATED, EndedService, MachineLoad, Outcome, Re
 from dodo_dsl.plan.added_services import CLOCK, RECORDER, TIME
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import start_order
-from dodo_dsl.run.machine_load import judgement
-from dodo_dsl.run.machine_load.judgement import consider
+from dodo_dsl.run.machine_load.judgement import JudgedFigures, consider
 from dodo_dsl.run.outcomes import (
     Cause,
     Facts,
@@ -262,12 +261,12 @@ class RunState:
     def outcome(self, backend: Backend) -> Outcome:
         plan = self.plan
         services = [service.name for service in plan.application.services]
-        answers = judgement.judged_response(self.response, plan.lockstep, services)
-        use = judgement.judged_use(self.resources, plan.resources)
+        figures = JudgedFigures()
+        figures.judge_answers(self.response, plan.lockstep, services)
+        figures.judge_use(self.resources, plan.resources)
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         judged = [check for verdict in verdicts for check in verdict.checks]
-        findings = (*answers.findings, *use.findings)
-        considered, load = consider(decide(self.facts, findings), self._load())
+        considered, load = consider(decide(self.facts, figures.findings), self._load())
         found = self._timed(considered)
         graph = [] if found.result == "passed" else self.graph[:_MOST_OF_GRAPH]
         finding = replace(found, reason="; ".join([*graph, found.reason, *self._details(found, backend.cid)]))
@@ -278,7 +277,7 @@ class RunState:
             execution_s=None if self.finished is None or self.began is None else self.finished - self.began,
             sim_s=self.time.seconds if self.time else None,
             services=tuple(self._service_rows()),
-            checks=(*judged, *answers.checks, *use.checks),
+            checks=(*judged, *figures.checks),
             verdicts=tuple(verdict.as_json() for verdict in verdicts),
             last_lines=self._tails.get(finding.service, ()) if finding.result != "passed" else (),
             notes=(
@@ -287,8 +286,7 @@ class RunState:
                 *self.graph[len(graph) :],
                 *(() if finding.cause == "silence" or finding.result == "error" else self._unmatched),
                 *losses,
-                *answers.notes,
-                *use.notes,
+                *figures.notes,
             ),
             machine=load,
             response=self.response,

@@ -1,7 +1,4 @@
-"""One test on a backend: DoDo's services on one side, the application's on the other, or all of them on the same.
-
-Services report to one queue, whichever side has them; all of them start in the same order.
-"""
+"""One test on a backend: DoDo's services on one side, the application's on the other, or all of them on the same."""
 
 import asyncio
 import contextlib

@@ -1,8 +1,4 @@
-"""Builds of an application's images: their names in a run, and copies of the folders that they get.
-
-The names let an application's file replace no image on the engine. The copies are without tests, their output and
-``.git``.
-"""
+"""Builds of an application's images: their names in a run, and copies of the folders that they get, without tests."""
 
 import hashlib
 import json

@@ -1,7 +1,4 @@
-"""The end of compose projects on an engine: stopped, reports copied, removed; also those that killed runs left.
-
-Projects are known by their label.
-"""
+"""The end of compose projects on an engine: stopped, reports copied, removed; also those that killed runs left."""
 
 import contextlib
 import os

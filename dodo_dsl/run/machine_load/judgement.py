@@ -1,11 +1,7 @@
-"""What measured load means: a machine too busy for a verdict, or an application that is slow or takes too much.
-
-A test in real time on a machine that was too busy ends in error. Answers in lockstep, by their times, and the
-application's use of processors and memory become checks where the test asks for them, else notes.
-"""
+"""What measured load means: a machine too busy for a verdict, or an application that is slow or takes too much."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from dodo_dsl.outcome import (
     PEAK_MEMORY,
@@ -80,70 +76,60 @@ MOST_SLOW = 0.1
 _MB = 1e6
 
 
-@dataclass(frozen=True)
+@dataclass
 class JudgedFigures:
-    """What follows from what was measured of the application."""
+    """What follows from what was measured of the application: checks where the test asks for them, else notes."""
 
-    findings: tuple[Finding, ...] = ()
-    checks: tuple[Check, ...] = ()
-    notes: tuple[str, ...] = ()
+    findings: list[Finding] = field(default_factory=list)
+    checks: list[Check] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
-    def judged(
-        self, name: str, value: float, most: float, reason: str, service: str, unit: str = "", digits: int | None = None
-    ) -> "JudgedFigures":
-        """With a check of a value, which is shown with some digits, and with a finding if it is above the limit."""
-        shown = value if digits is None else round(value, digits)
+    def _judge(self, name: str, values: tuple[float, float], most: float, reason: str, who: str, unit: str) -> None:
+        """Adds a check of a value, shown as the second of ``values``, and a finding if it is above ``most``."""
+        value, shown = values
         check = {"name": name, "value": shown, "limit": {"max": most}, "unit": unit, "ok": value <= most}
-        findings = () if value <= most else (Finding("failed", reason, service),)
-        return replace(self, findings=self.findings + findings, checks=(*self.checks, with_margin(check)))
+        self.checks.append(with_margin(check))
+        if value > most:
+            self.findings.append(Finding("failed", reason, who))
 
-    def noted(self, *notes: str) -> "JudgedFigures":
-        return replace(self, notes=(*self.notes, *filter(None, notes)))
+    def judge_answers(self, response: Response | None, lockstep: Lockstep | None, services: Sequence[str]) -> None:
+        """Judges what answers took by the limits of the test; ``services`` are the application's."""
+        if lockstep is None or response is None:
+            if lockstep and lockstep.max_response_s is not None:
+                self.notes.append(UNMEASURED)
+            return
+        answers, over, who = response.answers, response.over, services[0] if services else ""
+        if lockstep.max_response_s is not None and over is not None:
+            limit = f"{lockstep.max_response_s * 1000:g} ms (at most {lockstep.response_over * 100:g} %)"
+            reason = f"{over} of {answers} answers took longer than {limit}: {response.in_words()}"
+            self._judge(SLOW_ANSWERS, (over / answers,) * 2, lockstep.response_over, reason, who, "")
+        if lockstep.is_copied:
+            reason = f"{response.uncopied} of {answers} answers did not carry the sample time of their frame"
+            self._judge(SAMPLE_TIMES, (response.uncopied,) * 2, 0, reason, who, "")
+        if response.slow > MOST_SLOW * answers:
+            slow = f"{response.slow} of {answers} answers took longer than the frames' period"
+            period = f"{response.period_s * 1000:g} ms"
+            self.notes.append(f"too slow for real time: {slow} of {period}; {response.in_words()}")
 
-
-def judged_response(response: Response | None, lockstep: Lockstep | None, services: Sequence[str]) -> JudgedFigures:
-    """Judges what answers took by the limits of the test; ``services`` are the application's."""
-    judged, who = JudgedFigures(), services[0] if services else ""
-    if lockstep is None:
-        return judged
-    if response is None:
-        return judged.noted("" if lockstep.max_response_s is None else UNMEASURED)
-    answers, over, allowed = response.answers, response.over, lockstep.response_over
-    if lockstep.max_response_s is not None and over is not None:
-        limit = f"{lockstep.max_response_s * 1000:g} ms (at most {allowed * 100:g} %)"
-        reason = f"{over} of {answers} answers took longer than {limit}: {response.in_words()}"
-        judged = judged.judged(SLOW_ANSWERS, over / answers, allowed, reason, who)
-    if lockstep.is_copied:
-        reason = f"{response.uncopied} of {answers} answers did not carry the sample time of their frame"
-        judged = judged.judged(SAMPLE_TIMES, response.uncopied, 0, reason, who)
-    return judged.noted(_slowness(response))
-
-
-def _slowness(response: Response) -> str:
-    if response.slow <= MOST_SLOW * response.answers:
-        return ""
-    slow = f"{response.slow} of {response.answers} answers took longer than the frames' period"
-    return f"too slow for real time: {slow} of {response.period_s * 1000:g} ms; {response.in_words()}"
-
-
-def judged_use(uses: Sequence[ServiceUse], limits: ResourceLimits | None) -> JudgedFigures:
-    """Judges what each service used by the limits of the test."""
-    judged = JudgedFigures()
-    if limits is None:
-        return judged
-    for use in uses:
-        for name, value, most, unit, words in (
-            (PEAK_MEMORY, use.peak_memory_bytes / _MB, limits.max_memory_mb, "MB", "used {:,.4g} MB of memory"),
-            (PROCESSOR_TIME, use.processor_s, limits.max_processor_time_s, "s", "took {:.2f} s of processor time"),
-            (PROCESSOR_SHARE, use.processor_share, limits.max_processor_share, "", "took {:.0f} % of a processor"),
-        ):
-            if most is None:
-                continue
-            if value is None:
-                short = "is not judged: the test was too short to measure it"
-                judged = judged.noted(f"{name} of service '{use.service}' {short}")
-                continue
-            at_most = f"at most {most:,.6g} {unit}" if unit else f"at most {most * 100:g} %"
-            reason = f"application service '{use.service}' {words.format(value if unit else 100 * value)}, {at_most}"
-            judged = judged.judged(f"{name}-{use.service}", value, most, reason, use.service, unit, digits=3)
-    return judged.noted("" if uses else UNSEEN_USE)
+    def judge_use(self, uses: Sequence[ServiceUse], limits: ResourceLimits | None) -> None:
+        """Judges what each service used by the limits of the test."""
+        if limits is None:
+            return
+        for use in uses:
+            for name, value, most, unit, words in (
+                (PEAK_MEMORY, use.peak_memory_bytes / _MB, limits.max_memory_mb, "MB", "used {:,.4g} MB of memory"),
+                (PROCESSOR_TIME, use.processor_s, limits.max_processor_time_s, "s", "took {:.2f} s of processor time"),
+                (PROCESSOR_SHARE, use.processor_share, limits.max_processor_share, "", "took {:.0f} % of a processor"),
+            ):
+                if most is None:
+                    continue
+                if value is None:
+                    short = "is not judged: the test was too short to measure it"
+                    self.notes.append(f"{name} of service '{use.service}' {short}")
+                    continue
+                at_most = f"at most {most:,.6g} {unit}" if unit else f"at most {most * 100:g} %"
+                what = f"{words.format(value if unit else 100 * value)}, {at_most}"
+                reason = f"application service '{use.service}' {what}"
+                self._judge(f"{name}-{use.service}", (value, round(value, 3)), most, reason, use.service, unit)
+        if not uses:
+            self.notes.append(UNSEEN_USE)

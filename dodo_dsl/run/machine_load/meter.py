@@ -1,7 +1,4 @@
-"""Measures, at short intervals while a test runs, the load of the machine and what the application's services use.
-
-Use is processor time, and memory.
-"""
+"""Measures, at short intervals while a test runs, the load of the machine and what the application's services use."""
 
 import asyncio
 import contextlib

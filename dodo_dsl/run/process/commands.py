@@ -21,7 +21,6 @@ from dodo_dsl.run.process.confinement import Command
 from dodo_dsl.run.process.environment import (
     application_environment,
     base_environment,
-    expanded,
 )
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot, named_paths, package_path
 from dodo_dsl.run.rigs.ports import masked
@@ -99,7 +98,7 @@ class Commands:
             if problem := paths.file_problem(path):
                 raise EnvironmentProblem(f"env_file of '{service.name}': {problem}")
             raw = path in service.raw_files
-            own.update(dotenv_file(folder / expanded(path), {**given, **variables}, own, raw=raw))
+            own.update(dotenv_file(Path(paths.whole(path)), {**given, **variables}, own, raw=raw))
         own.update(given)
         own = {name: cids.get(name, with_cid_text(value, self.slot.cid)) for name, value in own.items()}
         if self.plan.isolation == "host" and any(each.name == BRIDGE for each in self.plan.application.services):

@@ -6,7 +6,6 @@ from collections.abc import Collection
 from pathlib import Path
 
 from dodo_dsl.application import secret_variables
-from dodo_dsl.application.interpolation import EnvironmentProblem
 
 _FOR_APPLICATIONS = ("PATH", "HOME", "USER", "LANG", "TZ", "TERM")
 _FOR_PROGRAMS = ("VIRTUAL_ENV", "LD_LIBRARY_PATH", "PYTHONPATH", "CLUON_SHAREDMEMORY_POSIX")
@@ -31,11 +30,3 @@ def application_environment(passed: Collection[str] = ()) -> dict[str, str]:
     return {
         name: value for name, value in base_environment(passed).items() if name in names or name.startswith(_LOCALE)
     }
-
-
-def expanded(path: str) -> Path:
-    """A path with ``~`` or ``~user`` replaced by a home folder; raises EnvironmentProblem."""
-    try:
-        return Path(path).expanduser()
-    except RuntimeError:
-        raise EnvironmentProblem(f"there is no home folder for '{path}'") from None

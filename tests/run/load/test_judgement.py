@@ -17,9 +17,8 @@ from dodo_dsl.outcome import (
 from dodo_dsl.plan.model import Lockstep
 from dodo_dsl.run.machine_load.judgement import (
     UNMEASURED,
+    JudgedFigures,
     consider,
-    judged_response,
-    judged_use,
 )
 from dodo_dsl.run.outcomes import Finding
 from dodo_dsl.spec.model import ResourceLimits
@@ -94,8 +93,8 @@ COPIED = replace(PLAIN, is_copied=True)
     ],
 )  # fmt: skip
 def test_how_an_application_answers_is_a_note(response: Response | None, lockstep: Lockstep | None, note: str) -> None:
-    found = judged_response(response, lockstep, ["steering"])
-    assert (found.notes, found.findings, found.checks) == ((note,) if note else (), (), ())
+    (found := JudgedFigures()).judge_answers(response, lockstep, ["steering"])
+    assert (found.notes, found.findings, found.checks) == ([note] if note else [], [], [])
 
 
 @pytest.mark.parametrize(
@@ -117,9 +116,9 @@ def test_how_an_application_answers_is_a_note(response: Response | None, lockste
 def test_a_limit_of_answers_is_a_check(
     response: Response, lockstep: Lockstep, name: str, value: float, most: float, reason: str
 ) -> None:
-    found = judged_response(response, lockstep, ["perception", "steering"])
+    (found := JudgedFigures()).judge_answers(response, lockstep, ["perception", "steering"])
     check = {"name": name, "value": value, "limit": {"max": most}, "unit": "", "ok": not reason}
-    assert found.checks == (with_margin(check),)
+    assert found.checks == [with_margin(check)]
     assert [(each.result, each.service) for each in found.findings] == [("failed", "perception")] * bool(reason)
     assert all(each.reason.startswith(reason) for each in found.findings)
 
@@ -138,9 +137,9 @@ TAKES = replace(QUIET, service="vision", peak_memory_bytes=1_460_000_000)
 )  # fmt: skip
 def test_limits_of_use_are_checks(key: str, most: float, name: str, value: float, unit: str, reason: str) -> None:
     """Of each service, in the order of their names."""
-    found = judged_use([replace(TAKES, processor_s=1.5123)], ResourceLimits(**{key: most}))
+    (found := JudgedFigures()).judge_use([replace(TAKES, processor_s=1.5123)], ResourceLimits(**{key: most}))
     check = {"name": f"{name}-vision", "value": value, "limit": {"max": most}, "unit": unit, "ok": False}
-    assert found.checks == (with_margin(check),) and differs_each_run(found.checks[0]["name"])
-    assert found.findings == (Finding("failed", f"application service 'vision' {reason}", "vision"),), "no verdict"
-    both = judged_use([TAKES, QUIET], ResourceLimits(**{key: value}))
+    assert found.checks == [with_margin(check)] and differs_each_run(found.checks[0]["name"])
+    assert found.findings == [Finding("failed", f"application service 'vision' {reason}", "vision")], "no verdict"
+    (both := JudgedFigures()).judge_use([TAKES, QUIET], ResourceLimits(**{key: value}))
     assert [(each["name"], each["ok"]) for each in both.checks][1:] == [(f"{name}-steering", True)]
