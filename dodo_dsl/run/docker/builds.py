@@ -23,8 +23,7 @@ def is_built(service: Mapping[str, Any]) -> bool:
 def private_images(services: Mapping[str, Any], folder: Path, variables: Mapping[str, str]) -> dict[str, str]:
     """The names of built images by the services that use them, of an application in ``folder``.
 
-    A name follows from the build and the image's name in the file: the next run of the same application finds its
-    layers and replaces the image, another application has other names.
+    A name follows from the build and the image's name in the file, so that no application replaces another's image.
     """
     images = {name: service.get("image") or f"/{name}" for name, service in services.items()}
     named = {}

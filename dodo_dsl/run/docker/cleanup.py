@@ -92,10 +92,7 @@ def _remove_network(network: Any) -> None:
 
 
 def reap_projects(client: Any) -> Reaped:
-    """Removes the projects of killed runs, which are those whose lease nobody holds.
-
-    A project that cannot be removed keeps its record for the next time.
-    """
+    """Removes the projects of killed runs, whose lease nobody holds; what cannot be removed keeps its record."""
     reaped = Reaped()
     for lease in leases.orphans(leases.PROJECT):
         project, test = lease.name.removeprefix(leases.PROJECT), lease.left.get("test", "?")
@@ -122,10 +119,7 @@ def take_down(
     report: tuple[Collection[str], Path],
     note: Callable[[str], None],
 ) -> bool:
-    """Whether everything was removed; ``report`` are the services that write it, and its folder.
-
-    The next run removes what cannot be removed now, as when the engine has stopped.
-    """
+    """Whether everything was removed; ``report`` are the services that write it, and its folder."""
     try:
         stop_project(client, project)
         for name in report[0]:

@@ -71,10 +71,7 @@ def refusal(
     command: Sequence[str],
     variables: Mapping[str, str],
 ) -> str:
-    """Why a container's first program cannot have the test's time, as ``application_time.refusal``.
-
-    ``entrypoint``, ``command`` and ``variables`` are the compose file's, in place of the image's or beside them.
-    """
+    """Why a container's first program, the compose file's or the image's, cannot have the test's time."""
     config = client.images.get(image).attrs["Config"]
     words = [
         *(entrypoint or config.get("Entrypoint") or ()),

@@ -1,7 +1,7 @@
 """``docker compose`` for one compiled test: its images, network, volumes and containers.
 
 DoDo's services are those of the compiled files, the application's those of the plan: with empty files and folders over
-what their mounts would show of the tests. An error message about a service leads back to the line of the spec.
+what their mounts would show of the tests.
 """
 
 import asyncio

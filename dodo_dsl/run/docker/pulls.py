@@ -30,10 +30,7 @@ class Pulls:
         return [note for note in await asyncio.gather(*waits) if note]
 
     async def once(self, key: str, work: Callable[[], Coroutine[Any, Any, str | None]]) -> str | None:
-        """Does work once for all tests of the run; later callers wait for the first.
-
-        Failed work is forgotten, so that a retried test repeats it.
-        """
+        """Does work once for all tests of the run, but again after it failed; later callers wait for the first."""
         task = self._tasks.get(key)
         if task is None:
             task = self._tasks[key] = asyncio.ensure_future(work())

@@ -1,9 +1,6 @@
 """Processes by ``/proc``: which descend from which, their processor time, and their memory.
 
 Memory is measured without cgroups, which not every machine has. Programs and files that are only read do not count.
-Files in memory that only a descriptor holds (memfd_create(2)), and System V memories that processes are attached to,
-count as shared memory that is mapped does; the larger of both. System V memories to which no process is attached count
-in addition.
 """
 
 import contextlib
@@ -82,7 +79,10 @@ def above(limits: Mapping[str, int], services: Mapping[int, str], proc: Path = P
 
 
 def memory(pids: Collection[int], segments: Iterable["Segment"], proc: Path = PROC) -> int:
-    """Bytes that processes use together. What they share counts once, if this user may know it."""
+    """Bytes that processes use together. What they share counts once, if this user may know it.
+
+    Of shared memory the larger counts: what is mapped, or what only descriptors and attached System V memories hold.
+    """
     sizes = [_sizes(f"{proc}/{pid}/status") or (0, 0) for pid in pids]
     if sum(map(sum, sizes)) - max(map(sum, sizes), default=0) > _SMALL:
         sizes = [_sizes(f"{proc}/{pid}/smaps_rollup") or size for pid, size in zip(pids, sizes, strict=True)]

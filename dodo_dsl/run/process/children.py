@@ -1,7 +1,4 @@
-"""The processes of a sandbox: forked, started or confined, collected when they end, and ended with all descendants.
-
-A Python module that is forked instead of started has what its parent has loaded already.
-"""
+"""The processes of a sandbox: forked, started or confined, collected when they end, and ended with all descendants."""
 
 import contextlib
 import functools

@@ -24,10 +24,7 @@ PROBE_S = 0.3
 
 
 def isolation_refusal(on_host: bool = False) -> str:
-    """Why applications cannot have their own namespaces here, and what to do; empty when they can.
-
-    What is missing is found by a trial. On the host it is their own process namespace alone.
-    """
+    """Why applications cannot have their own namespaces, on the host that of processes alone; empty when they can."""
     seen = [word for path in ("/usr", *MERGED) for word in ("--ro-bind-try", path, path)]
     words = [PROGRAM, "--unshare-pid", *([] if on_host else ["--unshare-net", "--unshare-ipc"]), *seen]
     try:
