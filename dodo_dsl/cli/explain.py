@@ -42,11 +42,11 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.word is None:
         width = max(map(len, rules))
         table = "".join(f"{page.name.ljust(width)}  {page.summary}\n" for page in rules.values())
-        stdout.write(json_text(list(map(_page, rules.values()))) if options.json else table)
+        stdout.write(json_text(list(map(asdict, rules.values()))) if options.json else table)
         return Exit.OK
     if options.word in rules:
         page = rules[options.word]
-        stdout.write(json_text(_page(page)) if options.json else catalogue.text(page))
+        stdout.write(json_text(asdict(page)) if options.json else catalogue.text(page))
         return Exit.OK
     try:
         checked = selection.select([options.word], (), options.application)
@@ -60,10 +60,6 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     stderr.write(selection.left_out(checked))
     write_diagnostics(stderr, checked.diagnostics)
     return Exit.OK if checked.ok else Exit.USAGE
-
-
-def _page(page: catalogue.Page) -> dict[str, str]:
-    return asdict(page)
 
 
 def explain(test: ResolvedTest) -> Explanation:

@@ -130,12 +130,6 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
             judgement = judge(plan, folder, recording, cid, work / "files")
     if run and run.slug != plan.slug:
         judgement = replace(judgement, notes=(f"the recording is of another test, {run.name}", *judgement.notes))
-    return _told(options, plan, recording, judgement, stdout)
-
-
-def _told(
-    options: argparse.Namespace, plan: Plan, recording: TestRecording, judgement: Judgement, stdout: TextIO
-) -> int:
     if options.json:
         stdout.write(as_json(plan, recording, judgement))
     else:

@@ -10,18 +10,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
+import numpy as np
+
 from dodo_dsl import atomic
 from dodo_dsl.atomic import refuse_existing
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.opendlv import message_versions
 from dodo_dsl.opendlv.message_columns import Numbers
-from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.odvd import OdvdError
-from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.rec import contents, recording_filter
+from dodo_dsl.opendlv.recording import Recording, matching
+from dodo_dsl.opendlv.recording_writer import RecordingWriter
+from dodo_dsl.rec import contents
 from dodo_dsl.rec.contents import contents_text
-from dodo_dsl.rec.recording_filter import NothingSelected, rows_of
 from dodo_dsl.spec.deployment import find_deployment, load_deployment
 from dodo_dsl.terminal import json_text, printable
+
+ABSOLUTE_S = 1e8
+"""Seconds from here on are counted since 1970, those below since the recording's start."""
 
 
 @dataclass(frozen=True)
@@ -40,26 +46,40 @@ class RecJob:
         tell(self.stderr, text)
 
     def rows(self) -> Numbers:
-        """The rows that the command line selects; reports damage first."""
-        if self.recording.damage:
-            self.tell(f"{self.recording.path}: {self.recording.damage}")
-        options = self.options
-        return rows_of(self.recording, self.messages, options.message, options.start, options.end)
+        """The rows that the command line selects, in the order of the file; reports damage first. Raises UsageError."""
+        recording, options = self.recording, self.options
+        if recording.damage:
+            self.tell(f"{recording.path}: {recording.damage}")
+        times = recording.index["time"]
+        begin = int(times[times != 0].min(initial=np.iinfo(np.int64).max))
+        rows = recording.rows(start=_microseconds(options.start, begin), end=_microseconds(options.end, begin))
+        if options.message:
+            try:
+                rows = rows[matching(recording.index[rows], map(self.messages.key, options.message))]
+            except MessageError as error:
+                raise UsageError(str(error)) from None
+        if not len(rows):
+            raise UsageError(f"nothing selected: no message of {recording.path} is within --start, --end, --message")
+        return rows
 
     def folder(self) -> Path:
-        """The output folder; raises NothingSelected for what is none."""
+        """The output folder; raises UsageError for what is none."""
         folder: Path = self.options.output or self.recording.path.with_suffix("")
         if folder.exists() and not folder.is_dir():
-            raise NothingSelected(f"'{folder}' is not a folder; name one with -o")
+            raise UsageError(f"'{folder}' is not a folder; name one with -o")
         return folder
 
     def file(self, suffix: str = "") -> Path:
-        """The output file; raises NothingSelected for the recording itself, OutputExists for one that stays."""
+        """The output file; raises UsageError for the recording itself, OutputExists for one that stays."""
         output: Path = self.options.output or self.recording.path.with_suffix(suffix)
         if output.exists() and output.samefile(self.recording.path):
-            raise NothingSelected(f"'{output}' is the recording itself; name another file with -o")
+            raise UsageError(f"'{output}' is the recording itself; name another file with -o")
         refuse_existing([output], self.options.force)
         return output
+
+
+def _microseconds(seconds: float | None, begin: int) -> int | None:
+    return None if seconds is None else round(seconds * 1e6) + (0 if seconds >= ABSOLUTE_S else begin)
 
 
 def tell(stderr: TextIO, text: str) -> None:
@@ -131,6 +151,7 @@ def _info(job: RecJob) -> None:
 def _cut(job: RecJob) -> None:
     output = job.file()
     rows = job.rows()
-    with atomic.replacing(output, durable=True) as place:
-        recording_filter.copy_rows(job.recording, rows, place)
+    with atomic.replacing(output, durable=True) as place, RecordingWriter(place) as writer:
+        for batch in job.recording.batches(rows):
+            writer.write_frames(batch.frames())
     job.stdout.write(f"{output}: {len(rows)} of {len(job.recording)} messages\n")

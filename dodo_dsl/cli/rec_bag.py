@@ -15,7 +15,6 @@ from dodo_dsl.cli.rec_actions import RecJob, tell
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.ros_types import Topic
 from dodo_dsl.rec import bag
-from dodo_dsl.rec.recording_filter import NothingSelected
 from dodo_dsl.spec.deployment import find_deployment
 from dodo_dsl.terminal import printable
 
@@ -62,7 +61,7 @@ def export_bag(job: RecJob) -> None:
         result = BagExport(job.recording, Types(messages=job.messages), writer)
         result.write(rows)
         if not result.counts:
-            raise NothingSelected(f"{job.recording.path} has no message that has a type of ROS 2")
+            raise UsageError(f"{job.recording.path} has no message that has a type of ROS 2")
     lines = [f"{topic} ({type_}): {count}" for (topic, type_), count in sorted(result.counts.items())]
     for id_, count in sorted(result.left_out.items()):
         name = job.messages.name(id_) if id_ in job.messages.ids() else f"message {id_}"

@@ -10,13 +10,12 @@ import numpy as np
 
 from dodo_dsl import atomic
 from dodo_dsl.atomic import refuse_existing
-from dodo_dsl.cli.errors import require_extra
+from dodo_dsl.cli.errors import UsageError, require_extra
 from dodo_dsl.cli.rec_actions import RecJob, opened, tell
 from dodo_dsl.cli.rec_bag import export_bag
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.rec import coco, csv_table
 from dodo_dsl.rec.frames import frame_names, frames, images_of, write_picture
-from dodo_dsl.rec.recording_filter import NothingSelected
 from dodo_dsl.rec.video import write_video
 
 MOST_TABLES = 1000
@@ -33,16 +32,16 @@ def _csv(job: RecJob) -> None:
 
 
 def _known(job: RecJob, become: str) -> tuple[Numbers, list[str]]:
-    """The selected rows with known messages, and the names of their tables; raises NothingSelected."""
+    """The selected rows with known messages, and the names of their tables; raises UsageError."""
     rows, path = job.rows(), job.recording.path
     types = job.recording.index["data_type"][rows]
     known: Numbers = rows[np.isin(types, list(job.messages.ids()))]
     if not len(known):
-        raise NothingSelected(f"{path} has only unknown messages; name their .odvd file with --messages")
+        raise UsageError(f"{path} has only unknown messages; name their .odvd file with --messages")
     names = csv_table.names(job.recording, job.messages, known)
     if len(names) > MOST_TABLES:
         reason = f"would become {len(names)} {become}, expected at most {MOST_TABLES}"
-        raise NothingSelected(f"{path} {reason}; choose messages with --message")
+        raise UsageError(f"{path} {reason}; choose messages with --message")
     if unknown := sorted(set(types.tolist()) - job.messages.ids()):
         job.tell(f"skipped unknown messages: {', '.join(map(str, unknown))}")
     return known, names
@@ -57,7 +56,7 @@ def _tell_skipped(job: RecJob, undecodable: Mapping[int, int]) -> None:
 def _images(job: RecJob) -> tuple[Numbers, Numbers]:
     """The selected frames of one camera, and all selected rows."""
     if job.options.message:
-        raise NothingSelected(f"--message does not apply to --{job.options.format}; choose a sender with --camera")
+        raise UsageError(f"--message does not apply to --{job.options.format}; choose a sender with --camera")
     rows = job.rows()
     return images_of(job.recording, rows, job.options.camera), rows
 
@@ -109,7 +108,7 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
         _data_set(options, stdout, stderr)
         return
     if len(options.files) > 1:
-        raise NothingSelected(f"--{options.format} takes one recording")
+        raise UsageError(f"--{options.format} takes one recording")
     with opened(options.files[0], options, stdout, stderr) as job:
         EXPORTS[options.format](job)
 
@@ -118,12 +117,12 @@ def _data_set(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> No
     """Frames and boxes of all recordings, some of which may be for validation; all of it or nothing."""
     files: Sequence[Path] = options.files
     if len(files) > 1 and options.output is None:
-        raise NothingSelected("name the folder of the data set with -o")
+        raise UsageError("name the folder of the data set with -o")
     if options.truth and options.labels is not None:
-        raise NothingSelected("--truth and --labels exclude each other: boxes come from a file or from a sender")
+        raise UsageError("--truth and --labels exclude each other: boxes come from a file or from a sender")
     folder: Path = options.output or files[0].with_suffix("")
     if folder.exists() and not folder.is_dir():
-        raise NothingSelected(f"'{folder}' is not a folder; name one with -o")
+        raise UsageError(f"'{folder}' is not a folder; name one with -o")
     parts = _parts(len(files), options.validation, options.seed)
     refuse_existing([folder / part / coco.ANNOTATIONS for part in parts], options.force)
     sets = {part: coco.DataSet() for part in parts}
@@ -136,7 +135,7 @@ def _data_set(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> No
         for part, each in sets.items():
             if not each.images:
                 named = files[0] if len(files) == 1 else f"{len(parts[part])} recordings"
-                raise NothingSelected(f"no frame of {named} that can be decoded has a detection with a box in it")
+                raise UsageError(f"no frame of {named} that can be decoded has a detection with a box in it")
             each.finish(place / part, classes, lambda text: tell(stderr, text))
     for part, each in sets.items():
         of = f" of {len(parts[part])} recordings" if len(files) > 1 else ""
@@ -148,7 +147,7 @@ def _parts(count: int, share: float, seed: int) -> dict[str, list[int]]:
     if not share:
         return {"": list(range(count))}
     if count < 2:
-        raise NothingSelected("--validation needs two recordings or more, as frames of one drive are alike")
+        raise UsageError("--validation needs two recordings or more, as frames of one drive are alike")
     wanted = min(max(round(share * count), 1), count - 1)
     chosen = sorted(random.Random(seed).sample(range(count), wanted))  # noqa: S311  (repeatable, not secret)
     return {"train": [n for n in range(count) if n not in chosen], "validation": chosen}

@@ -6,12 +6,9 @@
 #include "drivers/rig.h"
 #include "line.h"
 #include "memory/record.h"
-#include "motion/homing.h"
 #include "motion/motion.h"
 #include "port.h"
-#include "supervision/driver_monitor.h"
 #include "supervision/supervision.h"
-#include "supervision/turns.h"
 
 static struct line line;
 static uint32_t ticked;

@@ -18,7 +18,6 @@ from dodo_dsl.opendlv.recording import RecordingError
 from dodo_dsl.opendlv.session import SessionError
 from dodo_dsl.plan.plan_json import json_text
 from dodo_dsl.plan.test_files import FilesError
-from dodo_dsl.rec.recording_filter import NothingSelected
 from dodo_dsl.report.results import ResultsError
 from dodo_dsl.run.leases import LeaseTimeout
 from dodo_dsl.run.rigs.problems import RigProblem
@@ -38,7 +37,7 @@ def ended(error: BaseException, monkeypatch: pytest.MonkeyPatch, command: str = 
 
 
 USAGE = (
-    UsageError, NoSuchTest, OdvdError, RecordingError, FilesError, NothingSelected, OutputExists,
+    UsageError, NoSuchTest, OdvdError, RecordingError, FilesError, OutputExists,
     ResultsError,
 )  # fmt: skip
 

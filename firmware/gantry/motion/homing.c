@@ -1,4 +1,4 @@
-#include "motion/homing.h"
+#include "motion/motion.h"
 
 #include <stdlib.h>
 

@@ -1,10 +1,10 @@
-#include "supervision/driver_monitor.h"
+#include "supervision/supervision.h"
 
 #include <stdlib.h>
 
 #include "drivers/rig.h"
 #include "drivers/units.h"
-#include "motion/homing.h"
+#include "motion/motion.h"
 
 #define CONTRADICTION_MS 120      /* long enough to send a lost command twice more */
 #define TRAVEL_MS 100

@@ -1,4 +1,4 @@
-#include "supervision/turns.h"
+#include "supervision/supervision.h"
 
 #include <stdlib.h>
 
