@@ -32,91 +32,61 @@ _FORMATS = {
 }
 
 
+_ACTIONS = {
+    "info": "show messages, rates, gaps, frames and damage of a recording",
+    "cut": "copy a part of a recording into a new one, byte for byte",
+    "export": "export a recording for other tools",
+    "import": "make a recording of a bag of ROS 2, by the types of its topics (needs DoDo's extra 'ros')",
+}
+
+
 def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-    info = _action(actions, "info", "show messages, rates, gaps, frames and damage of a recording")
+    info, cut, export, bag = (actions.add_parser(name, help=text, description=text) for name, text in _ACTIONS.items())
+    for action in (info, cut):
+        action.add_argument("file", metavar="FILE.rec", type=Path)
+    export.add_argument("files", metavar="FILE.rec", type=Path, nargs="+", help="--coco takes several")
+    bag.add_argument("file", metavar="BAG", type=Path, help="folder of rosbag2, or its .mcap or .db3")
+    for action in (info, cut, export):
+        action.add_argument(
+            "--messages", metavar="SET", action="append", default=[],
+            help="message set 0.9 or 1.0 (default: detected from the content), or an additional .odvd file; repeatable",
+        )  # fmt: skip
     info.add_argument("--json", action="store_true", help="output as JSON")
     info.add_argument("--no-decode", action="store_true", help="count camera frames without decoding them")
-    cut = _action(actions, "cut", "copy a part of a recording into a new one, byte for byte")
     cut.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="new recording")
-    export = _action(actions, "export", "export a recording for other tools")
+    text = "new recording (default: the bag's name with .rec)"
+    bag.add_argument("-o", "--output", metavar="FILE", type=Path, help=text)
+    text = "smaller pictures, which look the same but are not; JPEG stays as it is"
+    bag.add_argument("--lossy", action="store_true", help=text)
+    _add_export(export)
+    for action in (cut, export):
+        text = "start time, in seconds since the recording's start or since 1970"
+        action.add_argument("--start", metavar="S", type=_seconds, help=text)
+        action.add_argument("--end", metavar="S", type=_seconds, help="end time (exclusive), as --start")
+        text = "message by name or id, with /senderStamp for one sender; repeatable (default: all)"
+        action.add_argument("--message", metavar="M", action="append", default=[], help=text)
+    for action in (cut, export, bag):
+        action.add_argument("--force", action="store_true", help="replace existing files")
+
+
+def _add_export(export: argparse.ArgumentParser) -> None:
     what = export.add_mutually_exclusive_group(required=True)
     for name, text in _FORMATS.items():
         what.add_argument(f"--{name}", dest="format", action="store_const", const=name, help=text)
-    export.add_argument(
-        "-o",
-        "--output",
-        metavar="PATH",
-        type=Path,
-        help="output folder or file (default: the recording's name with another ending)",
-    )
-    export.add_argument(
-        "--pictures", choices=("png", "jpg"), default="png", help="file type for --coco and --frames (default: png)"
-    )
-    export.add_argument(
-        "--camera", metavar="N", type=numbers.seed, help="sender stamp of the camera, if there are several"
-    )
-    export.add_argument(
-        "--labels", metavar="N", type=numbers.seed, help="sender stamp of the detections for --coco (default: all)"
-    )
-    export.add_argument(
-        "--truth", metavar="FILE.json", type=Path, help="truth file with the boxes for --coco, the same for every frame"
-    )
-    export.add_argument(
-        "--validation", metavar="SHARE", type=_share, default=0.0,
-        help="with --coco: folders train and validation, the latter with this share of the recordings",
-    )  # fmt: skip
+    text = "output folder or file (default: the recording's name with another ending)"
+    export.add_argument("-o", "--output", metavar="PATH", type=Path, help=text)
+    text = "file type for --coco and --frames (default: png)"
+    export.add_argument("--pictures", choices=("png", "jpg"), default="png", help=text)
+    text = "sender stamp of the camera, if there are several"
+    export.add_argument("--camera", metavar="N", type=numbers.seed, help=text)
+    text = "sender stamp of the detections for --coco (default: all)"
+    export.add_argument("--labels", metavar="N", type=numbers.seed, help=text)
+    text = "truth file with the boxes for --coco, the same for every frame"
+    export.add_argument("--truth", metavar="FILE.json", type=Path, help=text)
+    text = "with --coco: folders train and validation, the latter with this share of the recordings"
+    export.add_argument("--validation", metavar="SHARE", type=_share, default=0.0, help=text)
     export.add_argument("--seed", metavar="N", type=numbers.seed, default=0, help="chooses those recordings")
-    for action in (cut, export):
-        _selection(action)
-    text = "make a recording of a bag of ROS 2, by the types of its topics (needs DoDo's extra 'ros')"
-    imported = _action(actions, "import", text)
-    imported.add_argument(
-        "-o", "--output", metavar="FILE", type=Path, help="new recording (default: the bag's name with .rec)"
-    )
-    imported.add_argument(
-        "--lossy", action="store_true", help="smaller pictures, which look the same but are not; JPEG stays as it is"
-    )
-    imported.add_argument("--force", action="store_true", help="replace existing files")
-
-
-def _action(
-    actions: "argparse._SubParsersAction[argparse.ArgumentParser]", name: str, text: str
-) -> argparse.ArgumentParser:
-    action = actions.add_parser(name, help=text, description=text)
-    if name == "import":
-        action.add_argument("file", metavar="BAG", type=Path, help="folder of rosbag2, or its .mcap or .db3")
-        return action
-    if name == "export":
-        action.add_argument("files", metavar="FILE.rec", type=Path, nargs="+", help="--coco takes several")
-    else:
-        action.add_argument("file", metavar="FILE.rec", type=Path)
-    action.add_argument(
-        "--messages",
-        metavar="SET",
-        action="append",
-        default=[],
-        help="message set 0.9 or 1.0 (default: detected from the content), or an additional .odvd file; repeatable",
-    )
-    return action
-
-
-def _selection(action: argparse.ArgumentParser) -> None:
-    action.add_argument(
-        "--start",
-        metavar="S",
-        type=_seconds,
-        help="start time, in seconds since the recording's start or since 1970",
-    )
-    action.add_argument("--end", metavar="S", type=_seconds, help="end time (exclusive), as --start")
-    action.add_argument(
-        "--message",
-        metavar="M",
-        action="append",
-        default=[],
-        help="message by name or id, with /senderStamp for one sender; repeatable (default: all)",
-    )
-    action.add_argument("--force", action="store_true", help="replace existing files")
 
 
 def _seconds(text: str) -> float:

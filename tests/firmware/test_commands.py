@@ -58,16 +58,6 @@ def test_y1_and_y2_stay_square(bench: Bench) -> None:
     assert abs(bench.pose()["skew"]) < MICROSTEP["y"]
 
 
-@pytest.mark.parametrize("stop", ["$STOP", "$STOP:", "$STOP\r"])
-def test_stop_brakes(bench: Bench, stop: str) -> None:
-    bench.keep_running("0.4,0,0", 1)
-    assert bench.send_line(stop) == []
-    bench.run(0.9)
-    assert bench.status() == Status.IDLE
-    assert bench.speed() == pytest.approx(0, abs=1e-3)
-    assert bench.extremes()["ramp"][0] <= 0.5
-
-
 def test_run_ends_goto(bench: Bench) -> None:
     bench.send_line("$GOTO:0.9,0,0")
     bench.run(0.4)

@@ -1,7 +1,6 @@
 """The firmware's binary on the emulated rig: the port, the drivers, the true pose, faults."""
 
 import json
-import math
 import signal
 import subprocess
 import termios
@@ -31,41 +30,6 @@ def test_calibrate_goto_run_and_position(new_rig: Rig) -> None:
     assert all(fast <= most for fast, most in zip(extremes["speed"], SPEED.values(), strict=True))
     assert all(ramp <= most for ramp, most in zip(extremes["ramp"], ACCELERATION.values(), strict=True))
     assert new_rig.events == [one for one in new_rig.events if one["event"] in ("reset", "closed", "open")]
-
-
-def test_a_rig_that_differs_from_the_table(firmware: None) -> None:
-    with Rig("--scale", "1.03,1,0.99", "--shift", "0.007,0,2") as rig:
-        rig.open()
-        rig.calibrate()
-        rig.go(0.3, -0.2, 1)
-        x, y, yaw = rig.position()
-        pose = rig.pose()
-        true = (1.03 * x + 0.007, y, 0.99 * yaw + math.radians(2))
-        assert (pose["x"], pose["y"], pose["yaw"]) == pytest.approx(true, abs=3e-6)
-
-
-@pytest.mark.parametrize(
-    ("command", "status"),
-    [
-        ("push x 8", Status.STALL),
-        ("switch y2 closed", Status.LIMIT),
-        ("heat alpha warm", Status.HOT),
-        ("heat y1 hot", Status.HOT),
-        ("short x", Status.FAULT),
-        ("motors off", Status.FAULT),
-        ("cut spi", Status.FAULT),
-        ("cut clock", Status.FAULT),
-        ("cut data", Status.FAULT),
-    ],
-)
-def test_faults_stop_the_rig_and_have_a_status(rig: Rig, command: str, status: Status) -> None:
-    rig.keep_running("0.1,0.1,0.2", 0.4)
-    rig.command(command)
-    rig.run(0.02)
-    assert rig.status() == status
-    rig.run(0.6)
-    assert not rig.pose()["moves"]
-    assert rig.speed() < 1e-3
 
 
 def test_opening_the_port_resets_the_controller_and_the_position_stays(rig: Rig) -> None:

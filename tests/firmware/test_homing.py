@@ -141,14 +141,6 @@ def test_only_stop_ends_it_early(fresh: Bench) -> None:
     assert not fresh.pose()["moves"]
 
 
-@pytest.mark.thorough
-def test_calibrate_brakes_first(bench: Bench) -> None:
-    bench.keep_running("0.5,0,0", 1.2)
-    bench.calibrate()
-    assert max(bench.extremes()["ramp"][:2]) <= 0.5
-    assert bench.happened("slip") == []
-
-
 def test_a_reset_takes_up_the_position_of_the_drivers(bench: Bench) -> None:
     bench.keep_running("0.3,-0.2,0.4", 0.6)
     bench.command("restart")

@@ -66,13 +66,6 @@ def test_run_brakes_before_the_edge(bench: Bench, axis: str, sign: str) -> None:
     assert bench.events[before:] == []
 
 
-def test_a_sudden_turn_towards_the_edge_stays_inside(bench: Bench) -> None:
-    bench.go(0.93, 0, 0)
-    bench.keep_running("-0.1,0,0", 0.3)
-    bench.keep_running("1,0,0", 2)
-    assert bench.pose()["x"] <= BOUNDS["x"][1] + MICROSTEP["x"]
-
-
 def close_in_motion(bench: Bench, motor: str, velocity: str) -> None:
     bench.keep_running(velocity, 0.5)
     bench.command(f"switch {motor} closed")

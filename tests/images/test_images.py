@@ -3,7 +3,6 @@
 import contextlib
 import json
 import shutil
-import subprocess
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -14,7 +13,6 @@ import pytest
 import yaml
 
 from dodo_dsl import __version__
-from dodo_dsl.images import build_context
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from tests.images.conftest import ROOT, docker, own_volume
 from tests.images.targets import folders_of, targets
@@ -225,26 +223,6 @@ def test_layers_are_shared(built: dict[str, str]) -> None:
         size_below, below = found["base" if stage == "rig" else stage]
         assert layers[: len(below)] == below, name
         assert len(layers) - len(below) <= MOST_LAYERS and size - size_below <= MOST_BYTES, name
-
-
-@pytest.mark.proof
-def test_a_second_build_makes_the_same_files(built: dict[str, str], base_image: str, tmp_path: Path) -> None:
-    """The stage of the sources, built anew from files with other dates: its layers stay shared."""
-    folder = tmp_path / "dodo-images-again"
-    build_context.assemble(folder)
-    for path in folder.rglob("*.py"):
-        path.touch()
-    words = ["docker", "buildx", "build", "--quiet", "--no-cache", "--target", "code", "--file", "services/Dockerfile"]
-    words += ["--build-arg", f"BASE_IMAGE={base_image}", "--iidfile", str(tmp_path / "id"), "."]
-    subprocess.run(words, cwd=folder, check=True, capture_output=True, timeout=900)
-    image = (tmp_path / "id").read_text()
-    try:
-        sums = "find . -type f -exec sha256sum {} + | sort"
-        again = docker("run", "--rm", "--workdir", "/shared", image, "sh", "-c", sums)
-        first = docker("run", "--rm", "--workdir", "/opt/dodo", built["base"], "sh", "-c", sums)
-        assert again == first
-    finally:
-        docker("image", "rm", "--force", image)
 
 
 def test_the_example_application_is_built_and_starts(

@@ -1,4 +1,3 @@
-import csv
 import random
 import struct
 import subprocess
@@ -78,17 +77,6 @@ def test_messages_of_inner_messages_and_letters(tmp_path: Path, record: Callable
     head, *rows = text.decode().splitlines()
     assert head.endswith("sampleTimeStamp.seconds;sampleTimeStamp.microseconds;at.x;at.y;letter;big;")
     assert rows == [f"0;1;0;2;0;{time};1;-3;A;18446744073709551615;" for time in (1, 2, 3)]
-
-
-def test_only_what_is_selected(tmp_path: Path, record: Callable[..., Path]) -> None:
-    path = record([message("opendlv.proxy.DistanceReading", BEGIN + i * 1_000_000, i % 2) for i in range(6)])
-    found = ours(path, tmp_path / "out", "--message=1039/1", "--start=2")
-    assert list(found) == ["opendlv.proxy.DistanceReading-1.csv"]
-    with (tmp_path / "out" / "opendlv.proxy.DistanceReading-1.csv").open() as file:
-        assert [row["sampleTimeStamp.seconds"] for row in csv.DictReader(file, delimiter=";")] == [
-            str(BEGIN // 1_000_000 + 3),
-            str(BEGIN // 1_000_000 + 5),
-        ]
 
 
 def test_what_is_left_out_is_told(tmp_path: Path, record: Callable[..., Path]) -> None:

@@ -46,8 +46,6 @@ class FakeRig:
         self.calibrated = True
         self.silent = False
         self.homes_slowly = False
-        self.noise = b""
-        self.chopped = False
         self.received: list[tuple[str, tuple[float, ...]]] = []
         self._goal: list[float] | None = None
         self._home_at = 0.0
@@ -183,9 +181,7 @@ class FakeRig:
     def _answer(self, text: str) -> None:
         if self.silent or self._master is None:
             return
-        data = self.noise + f"${text}\n".encode()
-        for part in [data[i : i + 1] for i in range(len(data))] if self.chopped else [data]:
-            os.write(self._master, part)
+        os.write(self._master, f"${text}\n".encode())
 
     def _move(self, dt: float, now: float) -> None:
         if any(self.velocity) and now - self._last_run > WATCHDOG:

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from services.gantry import memory
 from services.gantry.link import Link, PortError, RigError
 from services.gantry.memory import agree, wanted
 from services.gantry.motion import Conversion
@@ -68,16 +67,6 @@ def test_what_is_no_limit(text: str, circle: bool) -> None:
 )
 def test_the_answer_to_limits(text: str, found: Limits | None) -> None:
     assert answer(text) == found
-
-
-def test_the_longest_line_is_one_that_the_rig_takes(line: tuple[FakeRig, Link]) -> None:
-    rig, link = line
-    names = ",".join(
-        f"{name}={(low + high) / 2 - 0.00005:.7f}" for name, (low, high) in LIMITS.items() if name != "yaw"
-    )
-    agree(link, wanted(names, Conversion()), write=True)
-    [arguments] = rig.commands("SETLIMITS")
-    assert len("$SETLIMITS:" + ",".join(f"{a:g}" if a != BUILT[2] else f"{a:.6f}" for a in arguments)) <= 64
 
 
 @pytest.mark.parametrize("write", [False, True])
@@ -143,11 +132,3 @@ def test_the_service_writes_them_when_it_calibrates(line: tuple[FakeRig, Link]) 
         assert limits.high.x == pytest.approx(0.3)
     order = words(rig)
     assert order.index("SETLIMITS") < order.index("CALIBRATE") < order.index("GOTO")
-
-
-def test_a_firmware_that_says_nothing_of_its_limits_is_an_error(
-    line: tuple[FakeRig, Link], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(line[0], "_answer_limits", lambda: None)
-    with pytest.raises(RigError, match="does not say its limits"):
-        memory.read_memory(line[1])

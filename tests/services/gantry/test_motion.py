@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.gantry.motion import FARTHEST, HOME, MotionLimits, Shaper, Velocity, box, turned
+from services.gantry.motion import FARTHEST, HOME, MotionLimits, Shaper, Velocity, box
 from services.gantry.protocol import Position
 
 MIDDLE = Position(0, 0, 0)
@@ -16,11 +16,6 @@ def settled(body: Velocity, at: Position) -> Velocity:
     for _ in range(200):
         velocity = shaper.step(body, at, 0.05)
     return velocity
-
-
-def test_forward_is_where_the_rig_looks() -> None:
-    left = turned(Velocity(1, 0.5, 2), math.pi / 2)
-    assert (left.x, left.y, left.yaw) == pytest.approx((-0.5, 1, 2))
 
 
 def test_the_measured_heading_turns_the_body() -> None:

@@ -46,18 +46,3 @@ def test_a_port_without_permission_names_its_group(terminal: tuple[int, str], mo
     monkeypatch.setattr(os, "open", refuse)
     with pytest.raises(OSError, match=f"^only the group that 'ls -lL {terminal[1]}' shows may open it$"):
         SerialPort(terminal[1])
-
-
-def test_what_cannot_be_kept_is_said(
-    terminal: tuple[int, str], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    allowed = fcntl.ioctl
-
-    def refuse(descriptor: int, request: int, *rest: Any) -> Any:
-        if request == termios.TIOCEXCL:
-            raise OSError("not here")
-        return allowed(descriptor, request, *rest)
-
-    monkeypatch.setattr(fcntl, "ioctl", refuse)
-    with contextlib.closing(SerialPort(terminal[1])):
-        assert "may reset the rig when it is closed, and is not locked: not here" in caplog.text

@@ -27,18 +27,6 @@ def same(a: Answer, b: Answer) -> bool:
     return a == b
 
 
-@pytest.mark.parametrize(
-    ("word", "arguments", "text"),
-    [
-        (Word.STOP, (), b"$STOP\n"),
-        (Word.RUN, (0.5, -0.25, 1), b"$RUN:0.500000,-0.250000,1.000000\n"),
-        (Word.GOTO, (-0.0000001, 1e-9, 1 / 3), b"$GOTO:0.000000,0.000000,0.333333\n"),
-    ],
-)
-def test_commands(word: Word, arguments: tuple[float, ...], text: bytes) -> None:
-    assert command(word, *arguments) == text
-
-
 @given(st.sampled_from(Word), st.lists(st.floats(-1e4, 1e4), max_size=3))
 def test_commands_say_what_they_are_given(word: Word, arguments: list[float]) -> None:
     match = COMMAND.fullmatch(command(word, *arguments).decode().removesuffix("\n"))

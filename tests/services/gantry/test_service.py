@@ -133,15 +133,6 @@ def test_a_fault_from_before_is_seen_and_not_erased(rig: FakeRig, status: int, w
     assert rig.status == status and not rig.commands("STOP") and not rig.commands("CALIBRATE")
 
 
-@pytest.mark.thorough
-def test_garbage_and_lines_in_parts_do_no_harm(rig: FakeRig) -> None:
-    rig.noise, rig.chopped = b"\xff\x00$0.\n$$,,\nok\n$12", True
-    with ready(rig) as model:
-        drive_here(model, lambda: rig.at[0] > 0.05, vx=0.3)
-        (frame,) = model.update(next(INSTANTS))
-        assert 0 < frame.message.x < 1
-
-
 @pytest.mark.parametrize(("code", "name"), [(8, "TROUBLE"), (99, "unknown to this version")])
 def test_a_rig_that_refuses_to_move_ends_the_test(rig: FakeRig, code: int, name: str) -> None:
     with ready(rig) as model:
@@ -219,14 +210,6 @@ def test_it_calibrates_only_on_request(rig: FakeRig) -> None:
     with ready(rig, "--calibrate"):
         assert rig.commands("CALIBRATE") == [()]
         assert rig.at == pytest.approx([0, 0, 0], abs=1e-3)
-
-
-@pytest.mark.parametrize(("turn", "flags"), [(True, ()), (False, ("--kind=circle",))])
-def test_it_moves_no_rig_with_the_firmware_of_the_other_kind(rig: FakeRig, turn: bool, flags: tuple[str, ...]) -> None:
-    rig.turn = turn
-    error = refused(rig, f"--serial={rig.path}", "--calibrate", *flags)
-    assert "kind circle" in error
-    assert not {"CALIBRATE", "GOTO", "RUN"} & {word for word, _ in rig.received}
 
 
 @pytest.mark.realtime
