@@ -1,6 +1,5 @@
 """Variables of an application: those that a test sets, and those that ``dodo tune`` varies."""
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 
@@ -12,9 +11,8 @@ from dodo_dsl.application.model import ApplicationSource, ComposeService, enviro
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.application.secret_variables import holds_secret, is_steering
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.opendlv.numbers import number
 from dodo_dsl.source import Entry, Node, Scalar
-from dodo_dsl.spec.vary import Range
+from dodo_dsl.spec.vary import Range, of_numbers
 
 _LIBRARIES = ("CLUON_SHAREDMEMORY_POSIX", "VIRTUAL_ENV")
 _SPLIT = frozenset("\"'\\;&|<>()`")
@@ -132,27 +130,17 @@ def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
     for service in application.services.values():
         for name, entry in source.entries(service.node, "x-dodo", "tune").items():
             found = _range(name, entry)
-            low, high, default = ends = (*found.ends, found.nominal)
-            message, span = "", entry.key
+            low, high = found.ends
+            texts = [end.text for end in (low, high, found.nominal)]
+            message = ""
             if why := owner(name):
                 message = f"'{name}' cannot be tuned: {why}"
-            elif wrong := next((end for end in ends if not _is_decimal(end.text)), None):
-                message, span = f"'{wrong.text}' is not a finite decimal number", wrong.span
-            elif number(low.text) >= number(high.text):
-                message, span = f"'from' is {low.text}, expected less than 'to', {high.text}", low.span
-            elif not number(low.text) <= number(default.text) <= number(high.text):
-                message, span = f"'default' is {default.text}, expected {low.text} to {high.text}", default.span
-            elif seen.setdefault(name, [end.text for end in ends]) != [end.text for end in ends]:
+            elif seen.setdefault(name, texts) != texts:
                 message = f"'{name}' has another range at another service, expected one: a parameter has one value"
             if message:
-                yield Diagnostic(span, "application-file", message)
-
-
-def _is_decimal(text: str) -> bool:
-    try:
-        return math.isfinite(number(text))
-    except ValueError:  # of a hexadecimal one, say
-        return False
+                yield Diagnostic(entry.key, "application-file", message)
+            else:
+                yield from of_numbers(found.nominal, low, high, "", "default")
 
 
 def _range(name: str, entry: Entry) -> Range:

@@ -69,7 +69,7 @@ def read(node: Node) -> tuple[tuple[Range, ...], list[Diagnostic]]:
             one, problems = Range(name, middle, ends, is_list=True), list(_of_list(middle, ends))
         elif isinstance(low, Scalar) and isinstance(high, Scalar):
             unit = quantity.written_unit(low.text)
-            one, problems = Range(name, middle, (low, high), unit or ""), list(_of_numbers(middle, low, high, unit))
+            one, problems = Range(name, middle, (low, high), unit or ""), list(of_numbers(middle, low, high, unit))
         if isinstance(middle, Scalar):
             ranges.append(one if one and not problems else Range(name, middle, ()))
         found += problems if isinstance(entry.value, Mapping) else ()
@@ -92,19 +92,22 @@ def _of_list(middle: Scalar, ends: tuple[Scalar, ...]) -> Iterator[Diagnostic]:
         yield Diagnostic(middle.span, "vary-range", message, did_you_mean(middle.text, texts))
 
 
-def _of_numbers(middle: Scalar, low: Scalar, high: Scalar, unit: str | None) -> Iterator[Diagnostic]:
+def of_numbers(
+    middle: Scalar, low: Scalar, high: Scalar, unit: str | None, key: str = "nominal"
+) -> Iterator[Diagnostic]:
+    """What is wrong with a range of numbers in a unit, empty for bare ones, None for none; ``key`` is the middle's."""
     if unit is None:
         message = f"'from' is '{low.text[:60]}', expected a number or a quantity"
         hint = quantity.with_point(low.text) or "for other values write 'among: [plain, wood]'"
         yield Diagnostic(low.span, "vary-range", message, hint)
         return
     numbers = []
-    for key, scalar in (("from", low), ("nominal", middle), ("to", high)):
+    for name, scalar in (("from", low), (key, middle), ("to", high)):
         try:
             numbers.append(_number(scalar.text, unit))
         except quantity.QuantityError as error:
-            yield Diagnostic(scalar.span, "wrong-unit", f"'{key}': {error}", error.hint)
+            yield Diagnostic(scalar.span, "wrong-unit", f"'{name}': {error}", error.hint)
     if len(numbers) == 3 and numbers[0] >= numbers[2]:
         yield Diagnostic(low.span, "vary-range", f"'from' is {low.text}, expected less than 'to', {high.text}")
     elif len(numbers) == 3 and not numbers[0] <= numbers[1] <= numbers[2]:
-        yield Diagnostic(middle.span, "vary-range", f"'nominal' is {middle.text}, expected {low.text} to {high.text}")
+        yield Diagnostic(middle.span, "vary-range", f"'{key}' is {middle.text}, expected {low.text} to {high.text}")

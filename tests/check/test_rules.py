@@ -67,8 +67,6 @@ CHANGES = [
         "frame-id: 1}}\n",
         "11:3 missing-parameter, 14:3 no-producer, map.json:1:1 wrong-file",
     ),
-    (cam("id: [0, 2], yaw: [0 deg, 90 deg]").replace("virtual-camera", "range-finder"), ""),
-    (cam("id: [0, 2], yaw: [0 deg, 90 deg, 9 deg]").replace("virtual-camera", "range-finder"), "12:93 wrong-value"),
     (track("goal: finish, walls: [a, finish, b]"), "12:68 unknown-name, 12:79 unknown-name"),
     (
         track("walls: ['*', blocks, hedge, obstacle-1, obstacle-2]")

@@ -55,6 +55,13 @@ def test_refuses(written: object, unit: str, message: str) -> None:
     assert str(error.value) == message
 
 
+@pytest.mark.parametrize(("text", "unit", "meant"), [("10 hz", "Hz", "Hz"), ("1gb", "B", "GB"), ("1 kb", "B", "kB")])
+def test_a_unit_in_other_letters_is_named(text: str, unit: str, meant: str) -> None:
+    with pytest.raises(QuantityError) as problem:
+        convert(text, unit)
+    assert problem.value.hint == f"did you mean '{meant}'?"
+
+
 @given(st.text(max_size=30), st.sampled_from(UNITS))
 @pytest.mark.thorough
 def test_any_text_converts_or_is_refused(text: str, unit: str) -> None:
