@@ -59,6 +59,7 @@ def _program(ids: Iterable[int]) -> Iterator[Instruction]:
 
 
 def _passing(encoded: bytes) -> Iterator[Instruction]:
+    """Return here when the bytes behind the tag are these, else go on behind."""
     pieces = [encoded[start : start + 2] for start in range(0, len(encoded), 2)]
     for number, piece in enumerate(pieces):
         yield _LOAD[len(piece)], 0, 0, _TAG + 1 + 2 * number
@@ -143,6 +144,7 @@ class Session:
         return frame
 
     def send_frames(self, frames: Iterable[bytes]) -> None:
+        """Sends encoded envelopes; raises SessionError."""
         try:
             for frame in frames:
                 self._sender.sendto(frame, self._bus)
@@ -226,6 +228,7 @@ class Session:
 
     @property
     def port(self) -> int:
+        """From which this session's datagrams come."""
         return self.address[1]
 
     def close(self) -> None:
