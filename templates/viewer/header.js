@@ -14,6 +14,16 @@ dodo.header = (function () {
     return files.includes("test.rec") ? [...found, make("button", { title: mcap, onclick: () => window.prompt("The recording for Foxglove", mcap) }, "MCAP command")] : found;
   }
 
+  // Keys of the whole page; what has the focus and keys of its own keeps them.
+  function pressed(event) {
+    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("button, input, select, summary")) return;
+    const moves = { ArrowLeft: -0.1, ArrowRight: 0.1, Home: -cursor.last, End: cursor.last };
+    if (event.key === " ") cursor.toggle();
+    else if (Object.hasOwn(moves, event.key)) cursor.move(cursor.time() + moves[event.key]);
+    else return;
+    event.preventDefault();
+  }
+
   function transport(parent) {
     const play = make("button", { "aria-label": "Play", onclick: cursor.toggle }, "▶");
     const slider = make("input", { type: "range", min: 0, max: cursor.last, step: 0.05, "aria-label": "Time of the test in seconds" });
@@ -45,6 +55,7 @@ dodo.header = (function () {
     part("reason").title = test.reason;
     part("files").append(...links());
     if (dodo.data.test.duration > 0) transport(part("transport"));
+    document.addEventListener("keydown", pressed);
   }
 
   return { show };

@@ -93,14 +93,19 @@ def soon(page: Page, selector: str, brightness: float) -> float:
 
 
 @pytest.mark.parametrize("page", ["wall hit"], indirect=True)
-def test_clicks_and_addresses_move_the_cursor(page: Page) -> None:
+def test_keys_clicks_and_addresses_move_the_cursor(page: Page) -> None:
+    times = []
+    for key in ("Home", "ArrowRight", "ArrowRight", "ArrowLeft", "End"):
+        page.press(key)
+        times.append(page.value("dodo.cursor.time()"))
+    assert times == pytest.approx([0, 0.1, 0.2, 0.1, page.value("dodo.cursor.last")])
     x, y, width = page.value("(b => [b.x, b.y, b.width])(document.querySelector('.u-over').getBoundingClientRect())")
     page.click(x + width / 2, y + 30)
     assert page.value("dodo.cursor.time()") == pytest.approx(3.21 / 2, abs=0.01)
     page.wait("location.hash === '#t=1.60' || location.hash === '#t=1.61'")
     page.value("location.hash = '#t=0.70'")
     page.wait("Math.abs(dodo.cursor.time() - 0.7) < 1e-6")
-    page.value("document.querySelector('#transport button').click()")
+    page.press(" ")
     page.wait("dodo.cursor.time() > 0.8")
 
 
