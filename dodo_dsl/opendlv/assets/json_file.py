@@ -41,8 +41,7 @@ def _document(file: Path, data: bytes) -> Any:
     try:
         text = data.decode("utf-8-sig")
         value = msgspec.json.decode(text)
-        pairs = json.loads(text, object_pairs_hook=tuple, parse_int=str, parse_float=str)
-        place = next(_repeated(pairs), "")
+        place = next(_repeated(text), "")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise InputError(file, f"byte {error.start} is not UTF-8 text", line=line) from None
@@ -62,17 +61,29 @@ def _document(file: Path, data: bytes) -> Any:
     return value
 
 
-def _repeated(value: object, place: str = "$") -> Iterator[str]:
-    """The paths of keys that stand twice in their objects, which are pairs here: they are lost in a dict."""
+def _repeated(text: str) -> Iterator[str]:
+    """The paths of keys that stand twice in their objects, which are lost when JSON becomes a dict."""
+    is_doubtful = False
+
+    def once(pairs: list[tuple[str, object]]) -> tuple[tuple[str, object], ...]:
+        nonlocal is_doubtful
+        is_doubtful |= len(dict(pairs)) < len(pairs)
+        return tuple(pairs)
+
+    document = json.loads(text, object_pairs_hook=once, parse_int=str, parse_float=str)
+    if is_doubtful:
+        yield from _repeated_in(document, "$")
+
+
+def _repeated_in(value: object, place: str) -> Iterator[str]:
     names = set[object]()
     for name, inner in value if isinstance(value, tuple) else ():
         if name in names:
             yield f"{place}.{name}"
         names.add(name)
-        yield from _repeated(inner, f"{place}.{name}")
+        yield from _repeated_in(inner, f"{place}.{name}")
     for number, inner in enumerate(value if isinstance(value, list) else ()):
-        if isinstance(inner, tuple | list):
-            yield from _repeated(inner, f"{place}[{number}]")
+        yield from _repeated_in(inner, f"{place}[{number}]")
 
 
 def converted(
