@@ -51,13 +51,22 @@ class Section:
         return radius * math.sin(turned), radius * (1 - math.cos(turned)), turned
 
 
+def bend(degrees: float, radius: float) -> Section:
+    """A bend to the left; negative degrees turn right."""
+    return Section(radius * math.radians(abs(degrees)), math.radians(degrees))
+
+
 @dataclass(frozen=True)
 class Track:
-    """A centre line from x, y and heading of ``start`` (m, rad). A ``lap`` ends where it begins."""
+    """A centre line from x, y and heading of ``start`` (m, rad). A ``lap`` ends where it begins.
+
+    With ``far``, a lap has this line half-way round, for gates, instead of the wall behind the start.
+    """
 
     sections: Sequence[Section]
     start: Pose = (0.0, 0.0, math.pi / 2)
     lap: bool = False
+    far: bool = False
     width: float = LANE
 
     @property
@@ -91,8 +100,8 @@ def _section(text: str) -> Section:
         raise UsageError(f"--line: '{text}' is not part of a centre line, {EXPECTED}")
     if match["length"]:
         return Section(_quantity("--line", match["length"], "m"))
-    angle, radius = math.radians(_quantity("--line", match["angle"], "deg")), _quantity("--line", match["radius"], "m")
-    return Section(radius * angle, angle if match["side"] == "left" else -angle)
+    degrees = _quantity("--line", match["angle"], "deg") * (1 if match["side"] == "left" else -1)
+    return bend(degrees, _quantity("--line", match["radius"], "m"))
 
 
 def _quantity(option: str, text: str, unit: str) -> float:
@@ -190,8 +199,22 @@ def model(name: str, file: str, color: list[float], places: Sequence[Point]) -> 
     return {"name": name, "file": file, "color": color, "instances": [[x, y, 0.0, 0.0] for x, y in places]}
 
 
+def cones(yellow: Sequence[Point], blue: Sequence[Point]) -> list[dict[str, Any]]:
+    return [model("cone_yellow", "cone.obj", YELLOW, yellow), model("cone_blue", "cone.obj", BLUE, blue)]
+
+
 def wall(name: str, places: Sequence[Point]) -> dict[str, Any]:
     return {"name": name, "lines": [[*start, *end] for start, end in pairwise(places)]}
+
+
+def floor(height: float = 0.0, size: float = 10.0) -> dict[str, Any]:
+    return {
+        "name": "floor",
+        "dimension": [size, size, 0.2],
+        "textureFile": "floor.png",
+        "textureSize": [0.5, 0.5],
+        "instances": [[0.0, 0.0, height - 0.1, 0.0]],
+    }
 
 
 def track_map(track: Track) -> dict[str, Any]:
@@ -207,17 +230,16 @@ def track_map(track: Track) -> dict[str, Any]:
         *_, end = poses([*driven, *beyond], 0.0, begin)
         behind = [rows[1][0], *across(ahead(begin, -BEHIND), half), rows[-1][0]]
         lines += [wall("behind", behind), wall("beyond", across(end, half))]
+    elif track.far:
+        *_, middle = poses(track.sections[: len(track.sections) // 2], 0.0, begin)
+        lines.append(wall("far", across(ahead(middle, track.sections[0].length / 2), half)))
     else:
         lines.append(wall("behind", across(ahead(track.start, LEAD - BACK), half)))
         rows = {side: places[:-1] for side, places in rows.items()}
-    models = [
-        model("cone_yellow", "cone.obj", YELLOW, rows[1]),
-        model("cone_blue", "cone.obj", BLUE, rows[-1]),
-        model("cone_red", "finish-cone.obj", RED, across(finish, outer)),
-    ]
-    size = max(10.0, math.ceil(2 * max(abs(value) for places in rows.values() for place in places for value in place)))
-    floor = {"name": "floor", "dimension": [size, size, 0.2], "textureFile": "floor.png", "textureSize": [0.5, 0.5]}
-    return {"model": models, "block": [floor | {"instances": [[0.0, 0.0, -0.1, 0.0]]}], "obstacles": lines}
+    red = model("cone_red", "finish-cone.obj", RED, across(finish, outer))
+    reach = max(abs(value) for places in rows.values() for place in places for value in place)
+    ground = floor(size=max(10.0, math.ceil(2 * reach)))
+    return {"model": [*cones(rows[1], rows[-1]), red], "block": [ground], "obstacles": lines}
 
 
 def as_json(value: object, indent: int = 0) -> str:

@@ -50,7 +50,7 @@ def test_repetitions_have_a_rate_and_skipped_tests_are_named() -> None:
 def test_verbose_shows_checks_and_use(tmp_path: Path) -> None:
     passed = replace(PASSED, checks=({"name": "gap", "value": 0.5, "limit": {"min": 0.1}, "unit": "m", "ok": True},))
     passed = replace(passed, resources=(ServiceUse("steering", 1.5, 0.25, 150_000_000),))
-    stream, reported = StringIO(), Reported(plan(), tmp_path)
+    stream, reported = StringIO(), Reported(plan(), tmp_path, Path("dodo-report/ok"))
     run_report.write_summary(stream, [passed], [], Verbosity.VERBOSE, {"ok": reported})
     used = "1.50 s of processor time (25 % of a processor), up to 150 MB of memory"
     assert stream.getvalue().splitlines()[2:-2] == [
