@@ -39,7 +39,7 @@ dodo.log = (function () {
   }
 
   function controls(list) {
-    const search = make("input", { type: "search", placeholder: "Search lines and services", "aria-label": "Search the log" });
+    const search = make("input", { type: "search", placeholder: "Search", "aria-label": "Search the log" });
     search.addEventListener("input", () => ((shown.text = search.value.toLowerCase()), filter(list)));
     const count = (hidden) => lines.filter(([, , level]) => !hidden.includes(level)).length;
     const level = choice("Level", LEVELS.map(([name, hidden], n) => [n, `${name} (${count(hidden)})`]), (n) => {
