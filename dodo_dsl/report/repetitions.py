@@ -13,6 +13,8 @@ from dodo_dsl.plan.added_services import RECORDING
 
 PATH = ("opendlv.sim.Frame", "opendlv.sim.KinematicState")
 """The messages of the vehicle's path."""
+_MOST_SHOWN, _MAX_SHOWN = 10, 60
+"""Runs of a line, and characters of a value."""
 
 
 def values(outcome: Outcome, report: Path) -> dict[str, str]:
@@ -61,7 +63,11 @@ def repeated(runs: Iterable[tuple[Path, Outcome, Path]]) -> dict[str, list[str]]
 
 
 def _differing(runs: Sequence[Mapping[str, str]]) -> list[str]:
-    """The names whose values are not all the same, each with the values of the runs in their order."""
+    """The names whose values are not all the same, each with the values of the first runs in their order."""
     names = dict.fromkeys(name for run in runs for name in run)
     rows = {name: [run.get(name, "none") for run in runs] for name in names}
-    return [f"{name}: {', '.join(row)}" for name, row in rows.items() if len(set(row)) > 1]
+    return [
+        f"{name}: {', '.join(value[:_MAX_SHOWN] for value in row[:_MOST_SHOWN])}"
+        for name, row in rows.items()
+        if len(set(row)) > 1
+    ]

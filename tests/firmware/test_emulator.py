@@ -1,10 +1,13 @@
 """The firmware's binary on the emulated rig: the port, the drivers, the true pose, faults."""
 
 import json
+import math
+import os
 import signal
 import subprocess
 import termios
 import time
+from pathlib import Path
 
 import pytest
 import serial
@@ -30,6 +33,41 @@ def test_calibrate_goto_run_and_position(new_rig: Rig) -> None:
     assert all(fast <= most for fast, most in zip(extremes["speed"], SPEED.values(), strict=True))
     assert all(ramp <= most for ramp, most in zip(extremes["ramp"], ACCELERATION.values(), strict=True))
     assert new_rig.events == [one for one in new_rig.events if one["event"] in ("reset", "closed", "open")]
+
+
+def test_a_rig_that_differs_from_the_table(firmware: None) -> None:
+    with Rig("--scale", "1.03,1,0.99", "--shift", "0.007,0,2") as rig:
+        rig.open()
+        rig.calibrate()
+        rig.go(0.3, -0.2, 1)
+        x, y, yaw = rig.position()
+        pose = rig.pose()
+        true = (1.03 * x + 0.007, y, 0.99 * yaw + math.radians(2))
+        assert (pose["x"], pose["y"], pose["yaw"]) == pytest.approx(true, abs=3e-6)
+
+
+@pytest.mark.parametrize(
+    ("command", "status"),
+    [
+        ("push x 8", Status.STALL),
+        ("switch y2 closed", Status.LIMIT),
+        ("heat alpha warm", Status.HOT),
+        ("heat y1 hot", Status.HOT),
+        ("short x", Status.FAULT),
+        ("motors off", Status.FAULT),
+        ("cut spi", Status.FAULT),
+        ("cut clock", Status.FAULT),
+        ("cut data", Status.FAULT),
+    ],
+)
+def test_faults_stop_the_rig_and_have_a_status(rig: Rig, command: str, status: Status) -> None:
+    rig.keep_running("0.1,0.1,0.2", 0.4)
+    rig.command(command)
+    rig.run(0.02)
+    assert rig.status() == status
+    rig.run(0.6)
+    assert not rig.pose()["moves"]
+    assert rig.speed() < 1e-3
 
 
 def test_opening_the_port_resets_the_controller_and_the_position_stays(rig: Rig) -> None:
@@ -58,16 +96,20 @@ def test_a_port_that_keeps_dtr_up_resets_nothing(rig: Rig) -> None:
     assert rig.status() == Status.IDLE
 
 
-def test_help_ends_with_an_example_that_runs(firmware: None) -> None:
+def test_help_ends_with_an_example_that_runs(firmware: None, tmp_path: Path) -> None:
     text = subprocess.run([EMULATOR, "--help"], capture_output=True, text=True, check=True).stdout
     words = text.splitlines()[-1].removeprefix("example: ").split()
     assert words[0] == "rig-emulator" and words[-1] == "build/firmware/gantry.elf"
-    process = subprocess.Popen([EMULATOR, ELF], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    link = tmp_path / "rig"
+    process = subprocess.Popen(
+        [EMULATOR, "--link", link, ELF], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
     assert process.stdout is not None and process.stdin is not None
     try:
         while "port" not in (line := process.stdout.readline()):
             assert line
-        with serial.Serial(json.loads(line)["port"], 115200, timeout=10) as port:
+        assert os.path.realpath(link) == json.loads(line)["port"]
+        with serial.Serial(str(link), 115200, timeout=10) as port:
             answer = b""
             while not answer:
                 port.write(b"$STATUS\n")
@@ -78,6 +120,7 @@ def test_help_ends_with_an_example_that_runs(firmware: None) -> None:
         process.stdin.close()  # which ends it
         process.stdout.close()
         assert process.wait(10) == 0
+    assert not link.is_symlink()
 
 
 def test_it_reports_that_it_was_late(firmware: None) -> None:
@@ -108,6 +151,7 @@ def test_it_reports_that_it_was_late(firmware: None) -> None:
         (["/dev/null"], "is not a firmware"),
         (["missing.elf"], "is not a firmware"),
         ([__file__], "is not a firmware"),
+        (["--link", "/nowhere/rig", str(ELF)], "no link"),
     ],
 )
 def test_mistakes_are_reported_in_one_sentence(firmware: None, words: list[str], sentence: str) -> None:

@@ -1,8 +1,11 @@
 #include "program/cable.h"
 
+#include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
 #include <pty.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <termios.h>
 #include <unistd.h>
@@ -15,9 +18,22 @@ static bool hung, dtr;
 static unsigned polls;
 static uint8_t buffer[8192];
 static size_t begin, end, written;
-static char terminal[64];
+static char terminal[64], *linked;
 
-const char *cable_plug(void)
+static bool make_link(const char *link)
+{
+    char fresh[4096];
+    if (snprintf(fresh, sizeof fresh, "%s.new", link) >= (int)sizeof fresh) {
+        errno = ENAMETOOLONG;
+        return false;
+    }
+    unlink(fresh);
+    free(linked);
+    linked = strdup(link);
+    return symlink(terminal, fresh) == 0 && rename(fresh, link) == 0;
+}
+
+const char *cable_plug(const char *link)
 {
     int slave;
     struct termios raw;
@@ -35,11 +51,13 @@ const char *cable_plug(void)
     hung = true;
     dtr = false;
     begin = end = 0;
-    return terminal;
+    return link == NULL || make_link(link) ? terminal : NULL;
 }
 
 void cable_unplug(void)
 {
+    if (linked != NULL)
+        unlink(linked);
     if (master >= 0)
         close(master);
     master = -1;

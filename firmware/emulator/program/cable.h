@@ -6,8 +6,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Plug it in. Returns the terminal's path, or NULL with errno. */
-const char *cable_plug(void);
+/* Plug it in; link, if not NULL, becomes a symbolic link to the terminal. Returns its path, or NULL with errno. */
+const char *cable_plug(const char *link);
 
 /* Unplug it: clients see the terminal hang up. */
 void cable_unplug(void);

@@ -29,6 +29,7 @@ static const char *const help =
     "Runs the gantry's firmware on an emulated ATmega328P, with models of its four L6470 drivers and of the rig. Its\n"
     "serial port is a pseudo terminal. Standard output gets a JSON object a line: {\"ready\": true, \"port\": ...},\n"
     "the true pose {\"t\": s, \"x\": m, \"y\": m, \"yaw\": rad, ...}, {\"event\": ...}.\n\n"
+    "  --link PATH        make PATH a symbolic link to the terminal\n"
     "  --kind KIND        of the rig, dynamic or circle, as the firmware's build (dynamic)\n"
     "  --start X,Y,YAW    where the rig stands at first, m and degrees (0.1,-0.1,11)\n"
     "  --scale X,Y,YAW    true m (rad) for each that the firmware's constants give (1,1,1); --start is by those constants\n"
@@ -48,9 +49,10 @@ static const char *const help =
     "  overruns            bytes that the controller's receiver lost\n"
     "  quit\n"
     "It ends with `quit`, on SIGTERM, and when standard input is a pipe that ends.\n\n"
-    "example: rig-emulator build/firmware/gantry.elf\n";
+    "example: rig-emulator --link /tmp/rig build/firmware/gantry.elf\n";
 
 static struct plant plant;
+static const char *link_path;
 static enum kind kind;
 static bool stepped, stdin_ends, reads = true, waits;
 static double until, next_pose, late_total, base_wall, base_time;
@@ -67,7 +69,7 @@ static double wall_clock(void)
 
 static bool plug(void)
 {
-    const char *terminal = cable_plug();
+    const char *terminal = cable_plug(link_path);
     if (terminal == NULL)
         return false;
     board_power(true);
@@ -228,9 +230,10 @@ static bool numbers_of(const char *text, double *numbers, double yaw_unit)
 static const char *start(int argc, char **argv)
 {
     static const struct option all[] = {
-        {"start", required_argument, NULL, 's'}, {"scale", required_argument, NULL, 'c'},
-        {"shift", required_argument, NULL, 'o'}, {"kind", required_argument, NULL, 'k'},
-        {"stepped", no_argument, NULL, 't'},     {"help", no_argument, NULL, 'h'}, {NULL, 0, NULL, 0},
+        {"link", required_argument, NULL, 'l'},  {"start", required_argument, NULL, 's'},
+        {"scale", required_argument, NULL, 'c'}, {"shift", required_argument, NULL, 'o'},
+        {"kind", required_argument, NULL, 'k'},  {"stepped", no_argument, NULL, 't'},
+        {"help", no_argument, NULL, 'h'},        {NULL, 0, NULL, 0},
     };
     const double degree = 3.14159265358979323846 / 180;
     double place[AXES] = {0.1, -0.1, 0.2}, scale[AXES] = {1, 1, 1}, shift[AXES] = {0};
@@ -238,6 +241,7 @@ static const char *start(int argc, char **argv)
     int which;
     while ((which = getopt_long(argc, argv, "h", all, NULL)) != -1) {
         switch (which) {
+        case 'l': link_path = optarg; break;
         case 's': valid &= numbers_of(optarg, place, degree); break;
         case 'c': valid &= numbers_of(optarg, scale, 1); break;
         case 'o': valid &= numbers_of(optarg, shift, degree); break;
@@ -286,7 +290,7 @@ int main(int argc, char **argv)
     signal(SIGPIPE, SIG_IGN);
     base_wall = wall_clock();
     if (!plug()) {
-        fprintf(stderr, "rig-emulator: no pseudo terminal: %s\n", strerror(errno));
+        fprintf(stderr, "rig-emulator: no pseudo terminal, or no link at %s: %s\n", link_path, strerror(errno));
         return 2;
     }
     run();
