@@ -1,14 +1,16 @@
 """What an application prints and declares as messages: lines become envelopes, which the runner sends for it.
 
 They come from the runner's address in the test: the application can send none of them itself. What matches nothing is
-log.
+log. Lines are matched in a thread of the test's own: RE2 lets the runner go on meanwhile.
 """
 
+import asyncio
 import math
 import re
 import struct
 import time
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -134,13 +136,14 @@ class ServiceLines:
     last: bytes = b""
     notes: dict[str, str] = field(default_factory=dict)
     """By what is wrong, as each is said once; empty when it was."""
+    is_over: bool = False
 
     def take(self, lines: Iterable[bytes]) -> list[Printed]:
         """The messages of lines, as many as patterns match; colours and what was written over do not count."""
         found = list[Printed]()
         for line in lines:
             for part in _FOR_TERMINALS.sub(b"", line).split(b"\r") if len(line) <= MAX_LINE else ():
-                made = self._printed(part)
+                made = [] if self.is_over else self._printed(part)
                 self.has_matched |= bool(made)
                 self.last = part if part.strip() and not made else self.last
                 found += made
@@ -190,16 +193,17 @@ class PrintedLines:
             for name, lines in declared.items()
         }
         self._hearers = {line: _hearers(plan, name, line) for name, lines in declared.items() for line in lines}
+        self._matcher = ThreadPoolExecutor(1, "lines")
         self._waiting: dict[str, list[Printed]] | None = None
         self._send: Send = lambda data, to=(BUS,): None
 
     def connect(self, send: Send) -> None:
         self._send = send
 
-    def match(self, service: str, lines: Sequence[bytes]) -> None:
+    async def match(self, service: str, lines: Sequence[bytes]) -> None:
         """Takes lines that a service printed, without their ends, and makes messages of them."""
         own = self.services[service]
-        found = own.take(lines)
+        found = [] if own.is_over else await asyncio.get_running_loop().run_in_executor(self._matcher, own.take, lines)
         for key, text in own.notes.items():
             if text:
                 self._note(text)
@@ -228,6 +232,11 @@ class PrintedLines:
         for line, id_, payload, sampled in found:
             envelope = Envelope(id_, payload, sent, 0, sent if sampled is None else sampled, line.sender)
             self._send(encode_frame(envelope), self._hearers[line])
+
+    def close(self) -> None:
+        for each in self.services.values():
+            each.is_over = True
+        self._matcher.shutdown(wait=False, cancel_futures=True)
 
     def unmatched(self) -> list[str]:
         """Of each service of which no line matched what it printed instead, in words."""

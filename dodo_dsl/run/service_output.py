@@ -1,4 +1,7 @@
-"""A service's output: raw into its log with times, the last lines in memory, and each line to a callback."""
+"""A service's output: raw into its log with times, the last lines in memory, and each line to a callback.
+
+Where lines are messages, they go to another thread instead, and nothing more is read until it has them all behind it.
+"""
 
 import asyncio
 import contextlib
@@ -7,8 +10,9 @@ import re
 import termios
 import tty
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
+from typing import Any
 
 from dodo_dsl import atomic
 from dodo_dsl.log_times import LogTimes
@@ -26,6 +30,8 @@ REPRINT = b"\x12"
 """What a terminal, asked for its unfinished line, answers with ``_REPRINTED``, and gives to no program (termios(3))."""
 _REPRINTED = re.compile(rb"\^R\r?\n")
 
+Match = Callable[[Sequence[bytes]], Coroutine[Any, Any, None]]
+
 
 class ServiceOutput:
     """The reading end of a pipe. ``writer`` is handed to the service; ``done`` is set at the end of its output.
@@ -40,7 +46,7 @@ class ServiceOutput:
         on_line: Callable[[bytes], bool],
         terminal: bool = False,
         is_cooked: bool = False,
-        match: Callable[[Sequence[bytes]], None] | None = None,
+        match: Match | None = None,
     ) -> None:
         """With ``terminal`` it is that of a terminal, to which programs write each line at once; raises OSError.
 
@@ -49,6 +55,8 @@ class ServiceOutput:
         self.type_in: Callable[[bytes], None] | None = None
         """Types into another terminal, whose output comes here some time after it was printed."""
         self._match = match
+        self._matching: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._matching.set_result(None)
         self._read_bytes, self._echoes = 0, asyncio.Semaphore(0)
         self._log = atomic.appended(log)
         self._times, self._begin = LogTimes(log), os.fstat(self._log.fileno()).st_size
@@ -94,7 +102,7 @@ class ServiceOutput:
 
     def _read(self) -> bool:
         try:
-            data = os.read(self._reader, _FULL if self._match else 1 << 16)
+            data = os.read(self._reader, 1 << 16)
         except BlockingIOError:
             return False
         except OSError:  # the end of a terminal that no program has open any more
@@ -160,11 +168,25 @@ class ServiceOutput:
             self._hand([self._rest] if self._rest != self._handed else [])
             if self._take(self._rest):
                 self._write(self._rest)
-        self.done.set()
+        if self._matching.done():
+            self.done.set()
 
     def _hand(self, lines: Sequence[bytes]) -> None:
-        if self._match is not None and lines:
-            self._match(lines)
+        """Has lines matched; until then, nothing is read."""
+        if self._match is None or not lines:
+            return
+        if self._reader >= 0:
+            asyncio.get_running_loop().remove_reader(self._reader)
+        self._matching = asyncio.ensure_future(self._match(lines))
+        self._matching.add_done_callback(self._read_on)
+
+    def _read_on(self, _: object) -> None:
+        if self._match is None or self.done.is_set():
+            return
+        if self._reader < 0:
+            self.done.set()
+        else:
+            asyncio.get_running_loop().add_reader(self._reader, self._read)
 
     async def read_empty(self) -> bool:
         """Has all matched that was printed until now, and a line without its end, as its program rests.
@@ -174,16 +196,18 @@ class ServiceOutput:
         """
         if self.type_in is not None:
             await self._hear_echo(self.type_in)
-        while self._is_open and self.type_in is None and self._read_bytes < _ENOUGH and self._read():
+        while await self._is_matched() and self.type_in is None and self._read_bytes < _ENOUGH and self._read():
             pass
         is_full, self._read_bytes = self._read_bytes >= _FULL, 0
-        if self._is_open and self._rest not in (b"", self._handed) and not (is_full or self._skipping):
+        if await self._is_matched() and self._rest not in (b"", self._handed) and not (is_full or self._skipping):
             self._handed = self._rest
             self._hand([self._rest])
+            await self._is_matched()
         return is_full
 
-    @property
-    def _is_open(self) -> bool:
+    async def _is_matched(self) -> bool:
+        """Waits for what is matched already; whether more can come."""
+        await asyncio.wait([self._matching])
         return self._match is not None and self._reader >= 0
 
     async def _hear_echo(self, type_in: Callable[[bytes], None]) -> None:

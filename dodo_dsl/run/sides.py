@@ -21,6 +21,7 @@ from dodo_dsl.run.service_protocol import Reports
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off, optional
 
 APPLICATION = "application"
+"""The layer that is not DoDo's."""
 
 
 class WatchedServices:
@@ -41,6 +42,7 @@ class WatchedServices:
         """Whether the application keeps the machine's time in lockstep, so that it is awaited by its answers."""
 
     def of(self, layer: str) -> tuple[PlannedService | ApplicationService, ...]:
+        """The services of a layer."""
         return self.plan.application.services if layer == APPLICATION else self.plan.layer(layer)
 
     def tell(self, event: Event) -> None:
@@ -104,6 +106,7 @@ class WatchedServices:
         return {name: name in ready for name in names}
 
     def prints(self, name: str) -> bool:
+        """Whether what a service prints becomes messages."""
         return name in self.lines.services
 
     def output(self, layer: str, name: str, take: Callable[[bytes], bool] | None = None, **kind: bool) -> ServiceOutput:
@@ -143,6 +146,7 @@ class WatchedServices:
     def close(self) -> None:
         """Reads what is there of what services said and wrote, and no more."""
         self.reports.close()
+        self.lines.close()
         for output in self.outputs.values():
             output.close()
 
@@ -216,6 +220,7 @@ class Backend:
 
     @property
     def by_answers(self) -> bool:
+        """Whether the application keeps the machine's time in lockstep."""
         return self._watched.by_answers
 
     async def begin(self) -> None:

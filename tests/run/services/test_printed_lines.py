@@ -1,5 +1,6 @@
 """What an application prints as messages: the values of fields, what makes none, and what is said of silence."""
 
+import asyncio
 import math
 import random
 from dataclasses import replace
@@ -45,7 +46,7 @@ class Desk:
     def print(self, *lines: bytes) -> list[tuple[int, int, dict[str, object]]]:
         """Sample time, sender stamp and fields of what lines made at once."""
         del self.sent[:]
-        self.lines.match("app", lines)
+        asyncio.run(self.lines.match("app", lines))
         return self.messages_sent()
 
     def messages_sent(self) -> list[tuple[int, int, dict[str, object]]]:
@@ -199,7 +200,7 @@ def test_only_another_program_that_may_take_it_makes_a_message_come_to_the_bus(
         tested = replace(plan, application=replace(plan.application, services=services))
         lines, to = PrintedLines(tested, tmp_path, print), list[str]()
         lines.connect(lambda _, names=(): to.extend(names))  # noqa: B023
-        lines.match("app", [b"group_06;1;0.5"])
+        asyncio.run(lines.match("app", [b"group_06;1;0.5"]))
         assert to == (["*"] if expected else [service.name for service in plan.services])
 
 

@@ -84,8 +84,12 @@ def test_a_terminal_is_read_empty_where_its_program_rests(tmp_path: Path) -> Non
     """And says whether so much came that the program may only have waited for room."""
     matched: list[bytes] = []
 
+    async def take(lines: Sequence[bytes]) -> None:
+        await asyncio.sleep(0.01)
+        matched.extend(lines)
+
     async def scene() -> None:
-        output = ServiceOutput(tmp_path / "app.log", lambda _: False, terminal=True, match=matched.extend)
+        output = ServiceOutput(tmp_path / "app.log", lambda _: False, terminal=True, match=take)
         os.write(output.writer, b"a\nb\nunfin")
         assert not await output.read_empty()
         assert matched == [b"a", b"b", b"unfin"]
@@ -110,8 +114,11 @@ def test_another_terminal_says_what_was_printed_until_now(tmp_path: Path) -> Non
     """By what it echoes, which its program never gets; one that echoes nothing is given up."""
     lines: list[bytes] = []
 
+    async def take(found: Sequence[bytes]) -> None:
+        lines.extend(found)
+
     async def scene() -> None:
-        output = ServiceOutput(tmp_path / "app.log", lambda _: False, is_cooked=True, match=lines.extend)
+        output = ServiceOutput(tmp_path / "app.log", lambda _: False, is_cooked=True, match=take)
         outer, inner = os.openpty()
         output.type_in = lambda data: os.write(outer, data) and None
 
