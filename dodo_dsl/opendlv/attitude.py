@@ -23,7 +23,7 @@ def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Matrix:
-    """The matrix of the same angles, from the body to the world."""
+    """The matrix of angles in rad, as ``quaternion`` turns by them, from the body to its parent."""
     (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
     return (
         (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),

@@ -122,6 +122,7 @@ def _form(type_: str) -> str:
 
 
 def load(path: Path) -> tuple[Definition, ...]:
+    """The messages of a file in their order; raises OdvdError."""
     try:
         text = regular_file.text(path, MAX_FILE_BYTES)
     except OSError as error:

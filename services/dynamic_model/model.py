@@ -118,6 +118,7 @@ class KiwiDrive:
         return {STEERING: limited(wheel, car.steering_limit) + self.offset, PEDAL: pedal}
 
     def step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
+        """The motion `dt` seconds later, with the actuators asked for the same all the time."""
         return step(motion, asked[STEERING], asked[PEDAL], dt, self.car)
 
     def reset(self) -> None: ...

@@ -79,11 +79,13 @@ class Player:
         return self.position >= len(self._due)
 
     def advance(self, now: int) -> None:
+        """It is `now`, microseconds of test time."""
         if self.playing and self._now is not None:
             self._elapsed += now - self._now
         self._now = now
 
     def when(self, position: int, in_next_round: bool = False) -> int:
+        """The test time at which an entry is due, in microseconds."""
         due: int = self._due[position] + (self._due[-1] if in_next_round else 0)
         return (self._now or 0) + due - self._elapsed
 

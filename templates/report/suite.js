@@ -3,6 +3,7 @@
 (function () {
   const form = document.getElementById("_filters");
   const tests = Array.from(document.querySelectorAll(".test"));
+  const opened = new Set(document.querySelectorAll(".matrix[open]"));
 
   function filter() {
     const [outcome, search] = ["outcome", "search"].map((name) => form.elements[name].value.toLowerCase());
@@ -14,7 +15,7 @@
     const shown = tests.filter((test) => !test.hidden).length;
     for (const matrix of document.querySelectorAll(".matrix")) {
       matrix.hidden = !matrix.querySelector(".test:not([hidden])");
-      matrix.open ||= shown < tests.length;
+      matrix.open = shown < tests.length || opened.has(matrix);
     }
     document.getElementById("_count").textContent = `${shown} of ${tests.length}`;
   }
@@ -23,8 +24,7 @@
   function reveal() {
     const target = tests.find((test) => `#${test.id}` === location.hash);
     if (!target) return;
-    form.reset();
-    filter();
+    if (target.hidden) form.reset(), filter();
     for (const closed of [target.closest(".matrix"), target.querySelector("details")]) if (closed) closed.open = true;
     target.scrollIntoView();
   }

@@ -16,9 +16,9 @@ dodo.header = (function () {
 
   // Keys of the whole page; what has the focus and keys of its own keeps them.
   function pressed(event) {
-    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("button, input, select, summary")) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("input, select")) return;
     const moves = { ArrowLeft: -0.1, ArrowRight: 0.1, Home: -cursor.last, End: cursor.last };
-    if (event.key === " ") cursor.toggle();
+    if (event.key === " " && !event.target.closest("button, summary")) cursor.toggle();
     else if (Object.hasOwn(moves, event.key)) cursor.move(cursor.time() + moves[event.key]);
     else return;
     event.preventDefault();
@@ -26,7 +26,7 @@ dodo.header = (function () {
 
   function transport(parent) {
     const play = make("button", { "aria-label": "Play", onclick: cursor.toggle }, "▶");
-    const slider = make("input", { type: "range", min: 0, max: cursor.last, step: 0.05, "aria-label": "Time of the test in seconds" });
+    const slider = make("input", { type: "range", min: 0, max: cursor.last, step: 0.01, "aria-label": "Time of the test in seconds" });
     slider.addEventListener("input", () => cursor.move(Number(slider.value)));
     const mark = make("span", { class: `mark ${test.outcome}`, title: `Decided at ${seconds(moment.time)}: ${moment.what}` });
     mark.style.setProperty("--share", moment.time / cursor.last);

@@ -110,7 +110,7 @@ def _parameters(service: PlannedService, check: str, recorded: Parameters) -> li
     return [name for name in named if name in own]
 
 
-VERSION = 4
+VERSION = 5
 _MOST = 20_000
 """Points and lines of a map that are drawn."""
 

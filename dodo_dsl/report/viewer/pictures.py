@@ -77,13 +77,13 @@ def _write(target: Path, images: Images, begin: int, most_bytes: int) -> Video |
     return None
 
 
-def _cameras(recording: Path, messages: MessageSet) -> tuple[int, dict[int, Images]]:
+def _cameras(recording: Path, messages: MessageSet, sender: int | None = None) -> tuple[int, dict[int, Images]]:
     """When a recording begins, in us, and its frames by sender stamp; nothing of one that is missing or empty."""
     found, id_ = dict[int, Images](), messages.id(PICTURES)
     try:
         with Recording(recording) as opened:
             begin = int(opened.index["time"].min()) if len(opened) else 0
-            for envelope in opened.envelopes(opened.rows({id_})):
+            for envelope in opened.envelopes(opened.rows({id_}, sender_stamps=None if sender is None else {sender})):
                 images = found.setdefault(envelope.sender_stamp, [])
                 if not images or envelope.sample_time > images[-1][0]:
                     images.append((envelope.sample_time, messages.decode(id_, envelope.payload)))
@@ -95,7 +95,7 @@ def _cameras(recording: Path, messages: MessageSet) -> tuple[int, dict[int, Imag
 def _played(replayed: Replayed, test: RecordedTest, messages: MessageSet) -> Images:
     """The frames of a recording at the times at which the test announced them, one after the other."""
     announced = test.channel(ANNOUNCED, replayed.sender)
-    begin, cameras = _cameras(replayed.path, messages)
+    begin, cameras = _cameras(replayed.path, messages, replayed.sender)
     images = cameras.get(replayed.sender, [])
     played = [image for image in images if replayed.begin <= (image[0] - begin) / MICROSECONDS <= replayed.end]
     times = [] if announced is None or announced.every > 1 else announced.times.tolist()

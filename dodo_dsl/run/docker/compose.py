@@ -108,6 +108,7 @@ class Compose:
         self._require_own()
 
     async def require_plugin(self) -> None:
+        """Raises BackendError where the docker command cannot compose."""
         code, _ = await self.run("version")
         if code:
             raise BackendError(f"the docker command has no 'compose' of version 2: {advice.DOCKER}")
