@@ -3,6 +3,7 @@
 import base64
 import csv
 import random
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -76,3 +77,22 @@ def test_every_message_is_read_by_libcluon(file: Path, tmp_path: Path) -> None:
         assert (row["sent.seconds"], row["sent.microseconds"], row["sampleTimeStamp.microseconds"]) == ("1", "2", "-5")
         wrong = {key: value for key, value in values.items() if not same(row[key], value)}
         assert wrong == {}, (definition.name, row)
+
+
+@each_file
+def test_libcluon_s_compiler_finds_the_same_fields(file: Path, tmp_path: Path) -> None:
+    pytest.importorskip("pycluon")
+    command = [TOOLS / "cluon-msc", "--proto", f"--out={tmp_path / 'all.proto'}", file]
+    subprocess.run(command, check=True, capture_output=True, timeout=60)
+    found = re.findall(
+        r"identifier: (\d+)\.\nmessage (\w+) \{\n(.*?)\}", (tmp_path / "all.proto").read_text(), re.DOTALL
+    )
+    assert {(int(id_), name, *re.findall(r"(\w+ \w+ = \d+)", fields)) for id_, name, fields in found} == {
+        (d.id, d.name.replace(".", "_"), *map(as_proto, d.fields)) for d in load(file)
+    }
+
+
+def as_proto(field: Field) -> str:
+    bits = INTEGER_BITS.get(field.type)
+    kind = field.type if bits is None else f"{'sint' if field.type.startswith('int') else 'uint'}{max(bits, 32)}"
+    return f"{kind} {field.name} = {field.number}"

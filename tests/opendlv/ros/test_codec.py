@@ -1,6 +1,9 @@
-"""Bytes of ROS messages: there and back, and what does not fit."""
+"""Bytes of ROS messages: there and back, against rclpy, and what does not fit."""
 
+import json
+import os
 import random
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -10,6 +13,8 @@ from hypothesis import strategies as st
 from dodo_dsl.opendlv.ros_codec import Codec, RosTypeError
 from tests.opendlv.ros.values import CARRIED, plain, some_fields
 
+ROOT = Path(__file__).parents[3]
+PYTHON = Path(os.environ.get("DODO_ROS_PYTHON", ROOT / "build/ros/bin/python"))
 CODEC = Codec()
 TWIST, DETECTIONS = "geometry_msgs/msg/Twist", "vision_msgs/msg/Detection2DArray"
 
@@ -22,6 +27,29 @@ def test_what_is_encoded_is_decoded(type_: str, rng: random.Random) -> None:
     assert data[:4] == b"\0\1\0\0"
     assert plain(CODEC.decode(type_, data)) == plain(fields)
     assert CODEC.encode(type_, CODEC.decode(type_, data)) == data
+
+
+@pytest.mark.thorough
+@pytest.mark.skipif(not PYTHON.exists(), reason="no Python with rclpy: name one in DODO_ROS_PYTHON")
+def test_rclpy_reads_and_writes_the_same() -> None:
+    rng = random.Random(47)
+    sent = [(type_, some_fields(CODEC, type_, rng)) for type_ in CARRIED for _ in range(5)]
+    lines = [json.dumps([type_, CODEC.encode(type_, fields).hex()]) for type_, fields in sent]
+    peer = subprocess.run(
+        [PYTHON, Path(__file__).with_name("rclpy_peer.py")],
+        input="\n".join(lines),
+        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    compared = set()
+    for (type_, fields), line in zip(sent, peer.stdout.splitlines(), strict=True):
+        if (found := json.loads(line)) is not None:
+            compared.add(type_.partition("/")[0])
+            assert found[0] == plain(fields), type_
+            assert plain(CODEC.decode(type_, bytes.fromhex(found[1]))) == plain(fields), type_
+    assert compared >= {"sensor_msgs", "geometry_msgs", "std_msgs"}
 
 
 @pytest.mark.parametrize(
@@ -40,6 +68,15 @@ def test_values_that_do_not_fit(type_: str, fields: dict[str, object], said: str
     with pytest.raises(RosTypeError) as error:
         CODEC.encode(type_, fields)
     assert said in str(error.value)
+
+
+@given(st.sampled_from(CARRIED), st.binary(max_size=80))
+def test_any_bytes_are_decoded_or_refused(type_: str, data: bytes) -> None:
+    for each in (data, b"\0\1\0\0" + data):
+        try:
+            CODEC.decode(type_, each)
+        except RosTypeError as error:
+            assert f"{len(each)} bytes are no {type_}" in str(error)
 
 
 def test_own_types(tmp_path: Path) -> None:
