@@ -1,5 +1,6 @@
 """A test of one's own recording: a template with its file, its duration and the first signal that can be judged."""
 
+import json
 import math
 import re
 from collections.abc import Collection
@@ -8,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from dodo_dsl.cli.errors import UsageError, files_of_the_user
-from dodo_dsl.cli.existing_application import Pictures, item
+from dodo_dsl.cli.existing_application import Pictures
 from dodo_dsl.cli.new_files import New, filled, spec_files
 from dodo_dsl.cli.rec_actions import messages_for
 from dodo_dsl.opendlv import recording_times
@@ -34,6 +35,7 @@ _LONGEST_GAP = MICROSECONDS
 """The player's, if it is not set otherwise."""
 _START_UP_S = 10
 _SUFFIX = ".rec"
+_PLAIN = re.compile(r"[\w.][\w./ -]*", re.ASCII)
 
 
 def files(
@@ -63,8 +65,8 @@ def files(
     spec = filled(
         "recording/dil-open-loop.dodo.yml",
         name=name,
-        description=item(f"Send {short} {'as recorded in' if target else 'for each picture of'} {path.name}."),
-        path=item(f"../{place.relative_to(registry.resolve()).as_posix()}"),
+        description=_quoted(f"Send {short} {'as recorded in' if target else 'for each picture of'} {path.name}."),
+        path=_quoted(f"../{place.relative_to(registry.resolve()).as_posix()}"),
         timeout=duration + 2 * _START_UP_S,
         max_time=duration + _START_UP_S,
         camera=cameras[0].sender_stamp if cameras else 0,
@@ -112,3 +114,8 @@ def _limit(recording: Recording, messages: MessageSet, target: MessageStream) ->
     distance = float(np.abs(values - np.median(values)).mean()) / 2 if len(values) else 0.0
     distance = distance or 0.1
     return f"{distance:.{min(max(0, 1 - math.floor(math.log10(distance))), 9)}f}"
+
+
+def _quoted(text: str) -> str:
+    """A text as a value of YAML."""
+    return text if _PLAIN.fullmatch(text) else json.dumps(text)

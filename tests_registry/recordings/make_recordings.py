@@ -36,7 +36,7 @@ from services.integrator.model import (  # noqa: E402
 )
 from services.rec_recorder.model import RecordingFile  # noqa: E402
 from services.scene.camera import Pinhole, mount  # noqa: E402
-from services.scene.lens import Distortion  # noqa: E402
+from services.scene.lens import Distortion, Lens  # noqa: E402
 from services.scene.render import Renderer  # noqa: E402
 from services.scene.scene import SceneOptions, load_scene  # noqa: E402
 from services.virtual_camera.model import VirtualCamera  # noqa: E402
@@ -103,7 +103,8 @@ class Recorded:
 def camera(recorded: Recorded, map_name: str, condition: Condition) -> VirtualCamera:
     """The camera in front of the car, which records what it sees."""
     scene = load_scene(HERE.parent / "maps" / map_name, SceneOptions(clutter=CLUTTER, seed=SEED))
-    optics = Optics(Pinhole(*SIZE, FOVY), LENS, Sensor(condition.exposure, 1.0, condition.noise, SEED), (), SHUTTER)
+    ideal = Pinhole(*SIZE, FOVY)
+    optics = Optics(ideal, Lens(ideal, LENS), Sensor(condition.exposure, 1.0, condition.noise, SEED), (), SHUTTER)
     renderer = Renderer(scene, optics.wide.width, optics.wide.height, optics.wide.fovy)
     mounted = mount(0.0, 0.0, ABOVE, 0.0, 0.0, 0.0)
     return VirtualCamera(renderer, mounted, lambda _argb, i420, now: recorded.show(i420, now), optics)
