@@ -33,8 +33,8 @@ def test_what_application_and_services_used_is_measured(bench: Bench) -> None:
     """The application's part is that of a process which it has started, and which has ended before the test does."""
     work = "import time\nwhile time.process_time() < 1.2: pass"
     application = f"import subprocess\nsubprocess.run([sys.executable, '-c', {work!r}])\n" + STARTED + WAIT
-    judge = READY + AFTER_START + "time.sleep(0.5)\n" + PASS
-    (outcome,) = bench.run(bench.plan(application=application, judge=judge))
+    works = "end = time.process_time() + 0.05\nwhile time.process_time() < end: pass\ntime.sleep(0.5)\n"
+    (outcome,) = bench.run(bench.plan(application=application, judge=READY + AFTER_START + works + PASS))
     load = outcome.machine
     assert load is not None and load.application is not None and load.services is not None
     assert (outcome.outcome, load.cores) == ("passed", len(os.sched_getaffinity(0)))
