@@ -139,15 +139,15 @@ def _application(options: argparse.Namespace, stdout: TextIO) -> int:
     kind = "ros" if options.ros else options.language or "python"
     python = ".ros/bin/python" if kind == "ros" and not has_ros else "python"
     process = "build/steering" if kind == "cpp" else f"{python}, steering.py"
-    compose = New(root / COMPOSE_FILES[0], filled(COMPOSE_FILES[0], process=process))
+    compose = New(root / COMPOSE_FILES[0], filled(COMPOSE_FILES[0], process=process, ros=options.ros))
     files = {FILE_NAME: _dodo_yml(root, COMPOSE_FILES[0]), COMPOSE_FILES[0]: compose}
     files |= filled_folder(kind, root, base=f"dodo/vision:{__version__}", process=process)
     test = f"{REGISTRY}/{_FIRST}/{_FIRST}{SUFFIX}"
-    if test not in files:
-        files[test] = New(root / test, filled(f"tests/{LEVEL}-{KIND}{SUFFIX}", name=_FIRST, pictures=""))
+    text = filled(f"tests/{LEVEL}-{KIND}{SUFFIX}", name=_FIRST, pictures="", ros=options.ros)
+    files[test] = New(root / test, text)
     if not (root / ".gitignore").exists():
         files[".gitignore"] = New(root / ".gitignore", filled("gitignore"))
-    write_new([*files.values(), *world_files(files[test].content, root / REGISTRY)], stdout)
+    write_new([*files.values(), *world_files(text, root / REGISTRY)], stdout)
     program = next(name for name in files if name.startswith("steering."))
     builds = () if has_ros else _BUILDS.get(kind, ())
     say_next([*builds, f"dodo run {_FIRST}", f"edit {program} and the test"], stdout)
@@ -309,7 +309,7 @@ def _files(
     if base := options.extends or STARTS[level, kind]:
         return _from_another(options.name, base, checked, shipped, registry, root)
     lines = "".join(f"      {key}: {value}\n" for key, value in pictures.parameters("virtual-camera").items())
-    text = filled(f"tests/{level}-{kind}{SUFFIX}", name=options.name, pictures=lines)
+    text = filled(f"tests/{level}-{kind}{SUFFIX}", name=options.name, pictures=lines, ros=False)
     files = [*spec_files(options.name, registry / options.name, root, text), *world_files(text, registry)]
     return files, pictures.note
 

@@ -378,12 +378,6 @@ def test_a_pipeline_that_is_there_is_told_what_to_add(repository: Path) -> None:
     assert (repository / ".gitlab-ci.yml").read_text() == own
 
 
-@pytest.mark.thorough
-def test_a_long_name_is_apart_from_its_comment(repository: Path) -> None:
-    assert dodo("new", "sil-" + "a" * 40)[0] == 0
-    assert dodo("compile", "--check") == FINE
-
-
 LINES = {
     "parts": "straight 1 m, left 45 deg radius 1 m, right 45 deg radius 80 cm",
     "points": "points.csv",
