@@ -35,16 +35,14 @@ class Access:
     """What a test's application may use of its host.
 
     ``roots`` are folders whose files are the application's own, besides those of its repository, ``paths`` others that
-    it may mount, ``passed`` variables of DoDo's own environment. ``outside`` says whether it may reach other networks,
-    ``devices`` and ``privileged`` what its rig allows. ``ports`` are those of the deployment's rigs: it gets none.
+    it may mount, ``passed`` variables of DoDo's own environment. ``outside`` says whether it may reach other networks.
+    ``ports`` are those of the deployment's rigs: it gets none.
     """
 
     roots: tuple[str, ...] = ()
     paths: tuple[str, ...] = ()
     passed: tuple[str, ...] = ()
     outside: bool = False
-    devices: bool = False
-    privileged: bool = False
     ports: tuple[str, ...] = ()
 
 

@@ -23,12 +23,8 @@ _LONG = 200
 def plan_application(application: ApplicationSource, setting: Setting) -> Application:
     construction = Construction(application, setting)
     services = {name: _container(construction, name, made) for name, made in construction.services().items()}
-    access = replace(
-        application.access,
-        roots=tuple(_relative(root, setting.folder) for root in application.other_roots),
-        devices=setting.hil,
-        privileged=setting.keeps_privileges,
-    )
+    roots = tuple(_relative(root, setting.folder) for root in application.other_roots)
+    access = replace(application.access, roots=roots)
     return Application(
         _relative(application.folder, setting.folder),
         tuple(

@@ -14,7 +14,7 @@ from dodo_dsl.check.wiring import ANYTHING
 from dodo_dsl.outcome import Outcome, Result
 from dodo_dsl.plan.added_services import FRAMES, RECORDER
 from dodo_dsl.plan.model import DISPLAY_SERVER, Plan, PlannedService
-from dodo_dsl.run.protocol import BackendError, Flooded, MemoryTaken, VerdictEvent
+from dodo_dsl.run.protocol import BackendError, Flooded, VerdictEvent
 from dodo_dsl.spec.manifest import load_manifests
 
 LOG = "logs/runner.log"
@@ -181,12 +181,6 @@ def _may_send(service: PlannedService, message: str) -> bool:
     manifest = load_manifests()[0].get(service.uses)
     ports = manifest.all_messages.outputs if manifest else (ANYTHING,)
     return any(port.rstrip("?").partition("/")[0] in (message, ANYTHING) for port in ports)
-
-
-def memory_taken(event: MemoryTaken) -> Finding:
-    """The end of a test whose application keeps a shared memory's lock: no busy machine takes as long."""
-    reason = f"the application keeps service '{event.service}' from its shared memory: {event.text}"
-    return Finding("failed", reason, event.service)
 
 
 def how_it_ended(code: int) -> str:

@@ -19,7 +19,6 @@ from dodo_dsl.run.outcomes import (
     flooded,
     how_it_ended,
     lost_messages,
-    memory_taken,
     outcome_of,
     unstartable,
 )
@@ -136,8 +135,8 @@ class RunState:
                 self.end("error", why)
             case Flooded():
                 self._end_with(flooded(self.plan, event))
-            case MemoryTaken():
-                self._end_with(memory_taken(event))
+            case MemoryTaken(service, text):  # no busy machine takes as long
+                self.end("failed", f"the application keeps service '{service}' from its shared memory: {text}", service)
             case Foreign(reason):
                 self.end("failed", reason, self._first_application())
             case Stopped():

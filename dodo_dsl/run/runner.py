@@ -50,10 +50,6 @@ class Policy:
     retries: int = 0
 
 
-def _nothing(_job: Job, _outcome: Outcome) -> None:
-    """The default of what is called when a test has ended."""
-
-
 class Runner:
     """Runs jobs, as many at once as ``schedule`` allows, in its order. Times are of the event loop's clock, in s.
 
@@ -77,7 +73,7 @@ class Runner:
         self._made: dict[str, int] = {}
         """How many attempts at each test there were."""
         self._stop = False
-        self._finished: Finished = _nothing
+        self._finished: Finished | None = None
 
     def not_run(self) -> list[NotRun]:
         """The tests that never began, in the order in which they would have."""
@@ -85,7 +81,7 @@ class Runner:
         plans = [job.plan for job in self.skipped]
         return [NotRun(plan.name, plan.slug, plan.spec, plan.level, reason) for plan in plans]
 
-    async def run(self, jobs: Sequence[Job], finished: Finished = _nothing) -> list[Outcome]:
+    async def run(self, jobs: Sequence[Job], finished: Finished | None = None) -> list[Outcome]:
         """The outcomes in the order of the jobs; SIGINT, SIGTERM and SIGHUP end all tests with their teardown.
 
         ``finished`` is called for each test as soon as its outcome is final.
@@ -126,7 +122,8 @@ class Runner:
             outcome = await self._turn(job, self.schedule.capacity, again) or outcome
         self._stop |= self.policy.fail_fast and outcome.outcome != "passed"
         self.progress.done(outcome)
-        self._finished(job, outcome)
+        if self._finished:
+            self._finished(job, outcome)
         return outcome
 
     async def _turn(self, job: Job, cores: int, attempt: Callable[[], Awaitable[Outcome]]) -> Outcome | None:

@@ -39,12 +39,12 @@ class Location:
 
 
 def _specs_below(folder: Path) -> Iterator[Path]:
-    """The specs of a folder on its own file system, without hidden folders; raises RegistryError."""
-    found, device = [], folder.stat().st_dev
+    """The specs of a folder without hidden folders; raises RegistryError."""
+    found = []
     for number, (place, folders, files) in enumerate(os.walk(folder), 1):
         if number > MAX_FOLDERS:
             raise RegistryError(f"'{folder}' has more than {MAX_FOLDERS} folders: name the folder with the tests")
-        folders[:] = [name for name in folders if not name.startswith(".") and _is_on(device, Path(place, name))]
+        folders[:] = [name for name in folders if not name.startswith(".")]
         names = [name for name in files if not name.startswith(".")]
         for name in names:
             if name.endswith(".dodo.yaml"):
@@ -52,13 +52,6 @@ def _specs_below(folder: Path) -> Iterator[Path]:
         specs = (Path(place, name) for name in names if name.endswith(SUFFIX))
         found += [path for path in specs if path.is_file()]
     yield from sorted(found)
-
-
-def _is_on(device: int, folder: Path) -> bool:
-    try:
-        return folder.lstat().st_dev == device
-    except OSError:
-        return False
 
 
 def _root_of(path: Path, registries: Sequence[Path]) -> Path:

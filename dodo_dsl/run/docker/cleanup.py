@@ -5,7 +5,7 @@ import os
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -16,7 +16,6 @@ from docker.errors import APIError, DockerException, NotFound
 
 from dodo_dsl.application import secret_variables
 from dodo_dsl.emit.compose import REPORT
-from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.docker.client import engine_error
 
@@ -108,23 +107,12 @@ def reap_projects(client: Any) -> Reaped:
     return reaped
 
 
-def writers(plan: Plan) -> set[str]:
-    return {service.name for service in plan.services if any(flag.kind == "report" for flag in service.flags)}
-
-
-def take_down(
-    client: Any,
-    project: str,
-    containers: Mapping[str, Any],
-    report: tuple[Collection[str], Path],
-    note: Callable[[str], None],
-) -> bool:
-    """Whether everything was removed; ``report`` are the services that write it, and its folder."""
+def take_down(client: Any, project: str, writers: Mapping[str, Any], report: Path, note: Callable[[str], None]) -> bool:
+    """Whether everything was removed; ``writers`` are the containers with parts of the report."""
     try:
         stop_project(client, project)
-        for name in report[0]:
-            if name in containers:
-                _copy_report(containers[name].id, name, report[1], note)
+        for name, container in writers.items():
+            _copy_report(container.id, name, report, note)
         remove_project(client, project)
     except Exception as error:  # noqa: BLE001  (whatever it was, the record of the project has to stay)
         reason = engine_error(error)

@@ -19,7 +19,7 @@ from dodo_dsl.plan.model import HEALTHY
 from dodo_dsl.run.application_time import PAGE_DESTROYED, POSIX_MEMORY
 from dodo_dsl.run.docker import beside_processes
 from dodo_dsl.run.docker.beside_processes import IMAGE
-from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down, writers
+from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down
 from dodo_dsl.run.docker.client import engine_error, refusal
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ContainerUse
@@ -277,8 +277,10 @@ class ContainerSide:
         return kept
 
     def _take_down(self) -> None:
-        report = (writers(self._plan), self._watched.report)
-        self.left_behind = not take_down(self._client, self._compose.project, self._containers, report, self._note)
+        names = [each.name for each in self._plan.services if any(flag.kind == "report" for flag in each.flags)]
+        writers = {name: self._containers[name] for name in names if name in self._containers}
+        report = self._watched.report
+        self.left_behind = not take_down(self._client, self._compose.project, writers, report, self._note)
 
     def _note(self, text: str) -> None:
         """Reports a sentence at once, and with the outcome; may be called from any thread."""
