@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import Outcome, worst_margin
 from dodo_dsl.report import checks
 from dodo_dsl.report.checks import Check
 
@@ -47,7 +47,8 @@ class Family:
     def worst(self) -> tuple[Outcome, Check] | None:
         """The one closest to failing with the check by which it is, of those that all have with a limit.
 
-        The check is the test's headline, or else the one by which an instance is closest to failing.
+        The check is the test's headline, or else the one by which an instance is closest to failing. Of several that
+        it makes equal, as those that hit a wall, the one of the worst margin.
         """
         judged = [outcome for outcome in self.outcomes if outcome.outcome != "error"]
         each = [(outcome, check) for outcome in judged for check in outcome.checks]
@@ -58,7 +59,7 @@ class Family:
             return None
         headlines = {o.headline for o in judged} & names
         shares = ((_share(outcome, name), name, outcome) for name in sorted(headlines or names) for outcome in judged)
-        _, name, outcome = min(shares, key=lambda each: each[:2])
+        _, name, outcome = min(shares, key=lambda each: (*each[:2], worst_margin(each[2]) or 0.0))
         check = check_of(outcome, name)
         return None if check is None else (outcome, check)
 

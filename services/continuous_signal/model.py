@@ -208,14 +208,18 @@ class SignalEvaluator(Evaluator):
         if self._limits["min-sign-share"] is not None and measures.samples and measures.sign_share is None:
             raise UnjudgeableError(f"the target is nowhere farther than {self._limits.floor:g} from 0: it has no sign")
         said = verdict(self._signal, target, measures, self._limits, span.within, self._late.facts(start))
-        self.notes = [*self._notes(measures)]
+        self.notes = [*self._notes(target, measures)]
         blind = measure(target, times, np.zeros(len(values)), *about).checks(self._limits)
         if said.outcome == "passed" and all(check.ok for check in blind):
             self.notes.append("a signal that is always 0 keeps all limits, too")
         return replace(said, evidence=measures.evidence())
 
-    def _notes(self, measures: SignalMeasures) -> Iterator[str]:
-        """What a verdict by other limits does not show: a signal that sees nothing, or is late."""
+    def _notes(self, target: Target, measures: SignalMeasures) -> Iterator[str]:
+        """What a verdict by other limits does not show: a signal that sees nothing, is late, or has no target."""
+        if measures.outside > 0.1 * measures.received:
+            begin, end = target.span
+            many = f"{measures.outside} of {measures.received} samples of {self._signal} are not judged"
+            yield f"{many}, as the target is from {begin:.2f} s to {end:.2f} s alone"
         run, lag, delays = measures.repeats, measures.lag, self._late.delays
         if run and 1 < run.samples == measures.samples:
             yield f"all {run.samples} samples of {self._signal} have the same value, {said(run.value)}"

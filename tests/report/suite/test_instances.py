@@ -71,6 +71,8 @@ def test_the_worst_instance_is_named_by_the_check_that_all_have() -> None:
     ]
     headlined = [replace(o, headline="to-goal") for o in matrix(x=("passed", 0, 0.03), y=("failed", 3.4, 0.4))]
     assert summary(headlined) == ["a: 1 of 2 passed, worst is [rec=y]: to-goal 3.4 m (at most 0 m)"]
+    (text,) = summary(matrix(x=("failed", 1.0, 0), y=("failed", 3.4, 0), z=("passed", 0, 0.5)))
+    assert "worst is [rec=y]: wall-margin 0 m" in text, "both hit the wall, and y farther from the goal"
     assert summary(matrix(x=("passed", 0, 0.03))) == []
 
 

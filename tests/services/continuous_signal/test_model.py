@@ -388,3 +388,10 @@ def test_times_of_another_clock_are_told_by_their_date() -> None:
         "but 1 sample with times of 2025-05-08, which are not the test's; if they are a recording's"
         in decided(it).reason
     )
+
+
+def test_samples_beyond_a_short_target_are_noted() -> None:
+    it = judge(limits(max_distance=0.5), Target(np.array([0, 2 * SECOND]), np.array([0.0, 0.8])))
+    hear(it, *((step / 10, min(0.04 * step, 0.8)) for step in range(61)))
+    assert decided(it).outcome == "passed"
+    assert f"40 of 61 samples of {SIGNAL} are not judged, as the target is from 0.00 s to 2.00 s alone" in it.notes
