@@ -1,7 +1,7 @@
 """Files and folders that appear whole or not at all: written beside their place under a hidden name, then renamed.
 
 A file replaces nothing but a file, and a folder nothing but an empty folder of this user: devices, FIFOs and sockets
-stay, and nothing is written into the folders of the kernel. A symlink to a file is replaced; what it points to stays.
+stay. A symlink to a file is replaced; what it points to stays.
 A file that is replaced keeps its permissions. With ``durable`` it outlives a loss of power, too.
 """
 
@@ -17,8 +17,6 @@ from pathlib import Path
 
 from dodo_dsl.opendlv.regular_file import kind_of
 
-_KERNELS = (Path("/dev"), Path("/proc"), Path("/sys"))
-_MEMORY = Path("/dev/shm")
 _MOST_NAME = 40
 """Characters of the target's name in a temporary one, which with the rest stays below the 255 bytes of a name."""
 
@@ -34,10 +32,6 @@ def refuse_others(path: Path) -> None:
 
     To be called before the work whose result goes there.
     """
-    folder = Path(os.path.realpath(path.parent))
-    kernels = next((place for place in _KERNELS if folder.is_relative_to(place)), None)
-    if kernels and not folder.is_relative_to(_MEMORY):
-        raise NotReplaceable(errno.EINVAL, f"{kernels} belongs to the kernel, and takes no output", str(path))
     with contextlib.suppress(FileNotFoundError):
         mode = path.stat().st_mode  # of what a symlink points to
         if stat.S_ISDIR(mode):

@@ -25,8 +25,6 @@ LIMIT_UNITS = {
     "acceleration": "m/s2",
     "yaw-acceleration": "rad/s2",
 }
-RPICAM = "rpicam"
-"""The source of a camera of a Raspberry Pi."""
 CAMERA_SOURCE = "camera.source"
 KIND_TAGS = {"static": ("hil-static",), "dynamic": ("hil-dynamic",), CIRCLE: ("hil-dynamic", "hil-circle")}
 """The tags of GitLab runners by the kinds of their rigs; the second keeps laps from a rig that winds up its cable."""
