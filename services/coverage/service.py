@@ -34,7 +34,7 @@ class Coverage(Evaluator):
         self.inputs = {("opendlv.sim.Frame", flags["frame-id"]): self._take_frame}
 
     def _take_frame(self, frame: Any, time: int) -> None:
-        """A frame that is not newer than the last, or of before the test, is ignored."""
+        """Takes a frame, unless it is from before the test or no newer than the last."""
         pose, before = vehicle_pose(frame), self._last
         if self.verdict is not None or (before is not None and time <= before[0]):
             return
