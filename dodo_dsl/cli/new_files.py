@@ -1,6 +1,5 @@
 """The files that ``dodo new`` writes: filled templates, and tests that are copied."""
 
-import functools
 import os
 import re
 from collections.abc import Sequence
@@ -8,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
-import jinja2
 import yaml
 
-from dodo_dsl import package_data
+from dodo_dsl import package_data, templates
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.diagnostics import shown_path
 from dodo_dsl.source import Mapping as Written
@@ -32,19 +30,9 @@ class New:
     content: bytes
 
 
-@functools.cache
-def _templates() -> jinja2.Environment:
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(package_data.templates() / "new"),
-        undefined=jinja2.StrictUndefined,
-        autoescape=False,  # noqa: S701  (YAML and Markdown of names that are checked)
-        keep_trailing_newline=True,
-        trim_blocks=True,
-    )
-
-
 def filled(template: str, **values: object) -> bytes:
-    return _templates().get_template(template).render(**values).encode()
+    environment = templates.environment("new", keep_trailing_newline=True, trim_blocks=True)
+    return environment.get_template(template).render(**values).encode()
 
 
 def filled_folder(name: str, root: Path, **values: object) -> dict[str, New]:

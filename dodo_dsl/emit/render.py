@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import jinja2
 
-from dodo_dsl import package_data
+from dodo_dsl import templates
 from dodo_dsl.emit import compose, yaml
 from dodo_dsl.plan.added_services import RECORDER
 from dodo_dsl.plan.model import LAYERS, Plan
@@ -53,11 +53,6 @@ def _filled(name: str, **values: object) -> str:
 
 @functools.cache
 def _templates() -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(package_data.templates()),
-        undefined=jinja2.StrictUndefined,
-        autoescape=False,  # noqa: S701  (YAML, every value of an author goes through a filter)
-        keep_trailing_newline=True,
-    )
+    environment = templates.environment(keep_trailing_newline=True)  # YAML: what authors write goes through filters
     environment.filters.update(yaml=json_text, plain=yaml.flow, compose=yaml.text)
     return environment

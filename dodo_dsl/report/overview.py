@@ -4,15 +4,13 @@ It shows everything without its script, which searches and filters.
 """
 
 import base64
-import functools
 import hashlib
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import jinja2
 from markupsafe import Markup
 
-from dodo_dsl import __version__, package_data
+from dodo_dsl import __version__, package_data, templates
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import checks
 from dodo_dsl.report.comparison import KINDS, Comparison
@@ -48,7 +46,7 @@ def render(
 ) -> str:
     """The page, with files by slug; with a comparison, what changed since that report."""
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
-    template = _environment().get_template("report.html.j2")
+    template = templates.environment(autoescape=True, finalize=_harmless).get_template("report.html.j2")
     return template.render(
         outcomes=outcomes,
         families=sorted(families(outcomes), key=lambda family: family.urgency),
@@ -67,16 +65,6 @@ def render(
         script=_text("report/suite.js"),
         style=_text("viewer/tokens.css") + _text("report/suite.css"),
         hash=source_hash,
-    )
-
-
-@functools.cache
-def _environment() -> jinja2.Environment:
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(package_data.templates()),
-        undefined=jinja2.StrictUndefined,
-        autoescape=True,
-        finalize=_harmless,
     )
 
 
