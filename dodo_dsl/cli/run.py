@@ -20,7 +20,6 @@ from dodo_dsl.cli.run_jobs import prepare
 from dodo_dsl.cli.run_report import save_report
 from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors, signals_interrupt, undisturbed
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report.next_report import next_report
 from dodo_dsl.report.overview import Past
@@ -193,7 +192,7 @@ def runner_of(
         stdout.write(f"{progress.count(len(jobs))}, {at_once}, {backend} backend\n")
     shown = progress.choose(stdout, [p.slug for p in plans], options.verbosity)
     _require_possible(options, backend, plans)
-    cids, nets, held = deployment.cids, subnets(deployment.subnets), (folder.lease.descriptor,)
+    cids, nets, held = deployment.cids, [str(deployment.subnets)], (folder.lease.descriptor,)
     backends = CombinedBackends(backend, cids, nets, options.isolation, held, server)
     return Runner(shown, backends, order, Policy(options.fail_fast, options.retry_errors), options.keep)
 

@@ -40,10 +40,6 @@ def cids(isolations: Sequence[str], available: Sequence[int]) -> list[int]:
     return [given[i] for i in range(len(isolations))]
 
 
-def subnets(network: ipaddress.IPv4Network, length: int = SMALLEST) -> list[str]:
-    return [str(part) for part in network.subnets(new_prefix=length)] if length >= network.prefixlen else []
-
-
 def _number(name: str, count: int) -> int:
     return zlib.crc32(name.encode()) % count
 

@@ -92,7 +92,8 @@ class Observer:
     def __init__(self, marked: Callable[[int, Sequence[Envelope]], Iterable[Envelope]] | None = None) -> None:
         self._marked = marked
         self._collected: list[Envelope] = []
-        self._relayed: deque[set[_Key]] = deque(maxlen=_REMEMBERED)
+        self._steps = 0
+        self._relayed: deque[set[_Key]] = deque(maxlen=2)
 
     def collect(self, envelope: Envelope) -> None:
         self._collected.append(envelope)
@@ -100,7 +101,10 @@ class Observer:
     def deliver(self, inbox: "Loop", until: int, relayed: Sequence[Envelope]) -> None:
         """Deliver all of a step (its end ``until`` in us). The answer to it waits: whether it is there is chance."""
         own = [envelope for envelope in relayed if not envelope.received]
-        self._relayed.append({_key(envelope) for envelope in own})
+        if self._steps % _REMEMBERED == 0:
+            self._relayed.append(set())
+        self._steps += 1
+        self._relayed[-1].update(map(_key, own))
         collected, self._collected = self._collected, []
         for envelope in collected:
             if until <= envelope.sample_time <= EPOCH + LONGEST:

@@ -18,8 +18,8 @@ LOOKS_HZ, SNAPSHOT_LOOKS_HZ = 200.0, 20.0
 """Times a second at most that memories are looked at."""
 FAST_LOOKS = 4
 """Looks a picture at most where the newest pictures are kept, of which none has to be exactly in time."""
-WAITING = 32_000_000
-"""Bytes of pictures that wait to be encoded: 69 of 640 x 480 pixels, which take a third of a second at the end."""
+WAITING = 128_000_000
+"""Bytes of pictures that wait to be encoded: 277 of 640 x 480 pixels, which take some 1.3 s where a test fails."""
 GATHERS = 0.01
 """Seconds in which messages may gather, in real time: to wake for each one costs more than to record it."""
 MEGABYTE = 1_000_000

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.check.spec_rules import prefix
-from dodo_dsl.plan.addresses import Subnets, cids, subnets
+from dodo_dsl.plan.addresses import Subnets, cids
 from dodo_dsl.spec.deployment import Deployment
 
 RANGE = Deployment.cids
@@ -60,7 +60,7 @@ def test_subnets_grow_with_the_application(containers: int, length: int) -> None
     found = [ipaddress.IPv4Network(give(name, containers)) for name in NAMES[:20]]
     assert {part.prefixlen for part in found} == {length}
     assert len(set(found)) == 20 and all(part.subnet_of(network) for part in found)
-    assert set(map(str, found)) <= set(subnets(network, length))
+    assert set(found) <= set(network.subnets(new_prefix=length))
 
 
 def test_large_and_small_subnets_are_apart() -> None:

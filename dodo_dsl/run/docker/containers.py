@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.check.spec_rules import SMALLEST
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.docker import cleanup
@@ -66,14 +67,10 @@ class Containers:
             lease.leave() if side.left_behind else lease.release()
 
 
-def other_subnets(first: str, all_subnets: Iterable[str]) -> Iterator[str]:
-    """The planned subnet, then the rest of the deployment's of the same size."""
+def other_subnets(first: str, networks: Iterable[str]) -> Iterator[str]:
+    """The planned subnet, then the rest of the deployment's networks of the same size."""
     yield first
-    length = int(first.partition("/")[2]) if first else 32
-    seen = {first}
-    for text in all_subnets:
-        network = ipaddress.IPv4Network(text)
-        same = str(network.supernet(new_prefix=length)) if length < network.prefixlen else text
-        if same not in seen:
-            seen.add(same)
-            yield same
+    length = int(first.partition("/")[2]) if first else SMALLEST
+    for network in map(ipaddress.IPv4Network, networks):
+        parts = network.subnets(new_prefix=max(length, network.prefixlen))
+        yield from (text for part in parts if (text := str(part)) != first)

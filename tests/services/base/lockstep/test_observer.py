@@ -83,13 +83,13 @@ def test_the_last_answer_is_seen_at_the_end_of_the_test() -> None:
 
 
 def test_what_services_sent_long_ago_is_forgotten() -> None:
-    """Fifty steps later a copy counts, unless a service sent the same again meanwhile; none is that late."""
+    """A hundred steps later a copy counts, unless a service sent the same again meanwhile; none is that late."""
     observer, inbox = Observer(), Seen()
-    for step in range(1, 53):
-        again = [sent(b"again", 88)] if step in (1, 40) else []
+    for step in range(1, 103):
+        again = [sent(b"again", 88)] if step in (1, 90) else []
         observer.deliver(inbox, EPOCH + step * STEP, [sent(b"once", 77), *again] if step == 1 else again)
     inbox.seen.clear()
     for payload, time in ((b"once", 77), (b"again", 88)):
         observer.collect(sent(payload, time, 9))
-    observer.deliver(inbox, EPOCH + 53 * STEP, [])
+    observer.deliver(inbox, EPOCH + 103 * STEP, [])
     assert inbox.seen == [(b"once", 77)]
