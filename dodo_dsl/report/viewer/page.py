@@ -30,8 +30,8 @@ from dodo_dsl.report.files import DATA, LOGS, PAGE, SHARED, TRAJECTORY
 from dodo_dsl.report.trajectory import Ground, Way, colour_of, ground_of
 from dodo_dsl.report.viewer import log_lines, moment, pictures, recorded
 from dodo_dsl.report.viewer.encoded import packed, script, shown
+from dodo_dsl.report.viewer.judged import read
 from dodo_dsl.report.viewer.pictures import Replayed
-from dodo_dsl.report.viewer.record import read
 from dodo_dsl.report.viewer.recorded import FRAME, Channel, RecordedTest
 from dodo_dsl.report.viewer.units import title_of, unit_of
 

@@ -11,7 +11,7 @@ import pytest
 from dodo_dsl.report.trajectory import Way, ground_of
 from dodo_dsl.report.viewer import page
 from dodo_dsl.report.viewer import recorded as recorded_test
-from dodo_dsl.report.viewer.record import JudgedRecord, read
+from dodo_dsl.report.viewer.judged import JudgedRecord, read
 from dodo_dsl.report.viewer.units import title_of, unit_of
 from services.base import Judged, JudgedBoxes
 from services.base import judged as recording
