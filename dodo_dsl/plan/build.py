@@ -23,7 +23,7 @@ from dodo_dsl.diagnostics import Span
 from dodo_dsl.plan import added_services, addresses
 from dodo_dsl.plan.added_services import DRAWN, hardware, lockstep
 from dodo_dsl.plan.application import plan_application
-from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
+from dodo_dsl.plan.model import ENDS_INPUT, Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
 from dodo_dsl.plan.test_files import FileCopy, FilesError, standing_once
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment import Deployment
@@ -259,7 +259,7 @@ class _Builder:
         flags = [_leaving_out(flag, self.test.left_out.get(use.name, ())) for flag in flags]
         flags.append(Flag("cid", str(self.cid)))
         if use.name == self.spec.until:
-            flags.append(Flag("ends-input", "true"))
+            flags.append(Flag(ENDS_INPUT, "true"))
         planned = PlannedService(
             use.layer,
             use.name,

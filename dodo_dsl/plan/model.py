@@ -21,6 +21,8 @@ STARTED, HEALTHY, COMPLETED = "service_started", "service_healthy", "service_com
 FlagKind = Literal["text", "path", "memory", "memories", "report"]
 
 
+ENDS_INPUT = "ends-input"
+"""The flag of an evaluator whose verdict ends the drive."""
 DISPLAY_SERVER = ("xvfb-run", "-a", "-s", "-screen 0 1920x1080x24 -nolisten tcp")
 """What starts a program with its own X server (xvfb-run(1))."""
 

@@ -10,7 +10,6 @@ from dodo_dsl.plan.added_services import CLOCK
 from dodo_dsl.plan.model import LAYERS, READY_S, Plan
 from dodo_dsl.run import listeners, start_order
 from dodo_dsl.run.machine_load.meter import Meter
-from dodo_dsl.run.outcomes import deaf
 from dodo_dsl.run.protocol import (
     BackendError,
     Event,
@@ -163,7 +162,8 @@ class Engine:
             return
         while waits and (listeners := await self.backend.listeners()) is not None and (waits := waits - {*listeners}):
             if self._now() >= deadline:
-                self.state.notes.append(deaf(sorted(waits), LISTEN_PATIENCE_S))
+                deaf = f"not joined the bus after {LISTEN_PATIENCE_S:g} s: what others sent before is lost"
+                self.state.notes += [f"'{name}', which consumes messages, had {deaf}" for name in sorted(waits)]
                 return
             if event := await self._next(self._now() + LISTEN_PERIOD_S):
                 self.state.take(event)

@@ -4,8 +4,8 @@ import errno
 import os
 import signal
 import traceback
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -13,7 +13,7 @@ from dodo_dsl import atomic
 from dodo_dsl.check.wiring import ANYTHING
 from dodo_dsl.outcome import Outcome, Result
 from dodo_dsl.plan.added_services import FRAMES, RECORDER
-from dodo_dsl.plan.model import DISPLAY_SERVER, Plan, PlannedService
+from dodo_dsl.plan.model import DISPLAY_SERVER, ENDS_INPUT, Plan, PlannedService
 from dodo_dsl.run.protocol import BackendError, Flooded, VerdictEvent
 from dodo_dsl.spec.manifest import load_manifests
 
@@ -38,11 +38,8 @@ class Finding:
     """Whether nothing came of the application, which may be on another bus."""
 
 
-@dataclass
-class Facts:
-    evaluators: tuple[str, ...]
-    findings: list[Finding] = field(default_factory=list)
-    verdicts: dict[str, list[VerdictEvent]] = field(default_factory=dict)
+Verdicts = Mapping[str, Sequence[VerdictEvent]]
+"""What each evaluator of a test has said, in the order of its spec."""
 
 
 def outcome_of(plan: Plan, finding: Finding, backend: str, cid: int) -> Outcome:
@@ -65,31 +62,22 @@ def outcome_of(plan: Plan, finding: Finding, backend: str, cid: int) -> Outcome:
     )
 
 
-def worst(results: Iterable[Result]) -> Result:
-    """error > failed > passed."""
-    return max(results, key=_RANK.__getitem__, default="error")
-
-
-def decide(facts: Facts, others: Sequence[Finding] = ()) -> Finding:
+def decide(plan: Plan, findings: Sequence[Finding], verdicts: Verdicts, others: Sequence[Finding] = ()) -> Finding:
     """The finding that decides: the first of the worst kind. Without a single verdict nothing passes.
 
-    ``others`` are findings that follow those of the evaluators, of whose kind none passes.
+    The evaluator that ends the drive (``until``) comes before the rest. ``others`` are findings that follow those of
+    the evaluators, of whose kind none passes.
     """
-    findings = [
-        *facts.findings,
-        *(f for name in facts.evaluators for f in _judged(name, facts.verdicts.get(name, []))),
-    ]
-    if not findings:
+    until = [s.name for s in plan.services if any(flag.name == ENDS_INPUT for flag in s.flags)]
+    judged = [f for name in sorted(verdicts, key=lambda name: name not in until) for f in _judged(name, verdicts[name])]
+    if not findings and not judged:
         return Finding("error", "no evaluator gave a verdict")
-    findings.extend(others)
-    result = worst(f.result for f in findings)
-    deciding = [f for f in findings if f.result == result]
-    if result == "passed":
-        is_one = len(deciding) == 1
-        return Finding(
-            "passed", "; ".join(f.reason for f in deciding), deciding[0].service, "verdict" if is_one else ""
-        )
-    return deciding[0]
+    every = [*findings, *judged, *others]
+    first = max(every, key=lambda finding: _RANK[finding.result])
+    if first.result != "passed" or len(every) == 1:
+        return first
+    passed = [finding for name in verdicts for finding in judged if finding.service == name]
+    return Finding("passed", "; ".join(finding.reason for finding in passed), passed[0].service)
 
 
 def _judged(evaluator: str, verdicts: Sequence[VerdictEvent]) -> list[Finding]:
@@ -102,18 +90,13 @@ def error_outcome(plan: Plan, backend: str, reason: str) -> Outcome:
     return outcome_of(plan, Finding("error", reason), backend, plan.cid)
 
 
-def error_reason(error: Exception, report: Path) -> str:
-    """Why an exception left a test without a verdict, in a sentence; ``report`` takes the log of an internal error."""
-    text = describe(error, report)
-    return f"this machine cannot run the test: {text}" if isinstance(error, OSError) else text
-
-
 def describe(error: Exception, report: Path) -> str:
     """The text of an exception; the traceback of an internal error goes into LOG in the folder ``report``."""
     if isinstance(error, BackendError):
         return str(error)
     if isinstance(error, OSError):
-        return system_error(error)
+        place = f"{error.filename}: " if error.filename else ""
+        return f"this machine says: {place}{error.strerror or error}"
     log = report / LOG
     try:
         with atomic.appended(log) as file:
@@ -123,12 +106,6 @@ def describe(error: Exception, report: Path) -> str:
         more = ""
     text = " ".join(str(error).split())[:_MAX_ERROR_TEXT]
     return f"internal error: {type(error).__name__}: {text}{more}"
-
-
-def system_error(error: OSError) -> str:
-    """File and meaning of a system error, without its number."""
-    place = f"{error.filename}: " if error.filename else ""
-    return f"{place}{error.strerror or error}"
 
 
 def unstartable(plan: Plan, service: str, why: str) -> str:
@@ -145,24 +122,6 @@ def unstartable(plan: Plan, service: str, why: str) -> str:
         folder = outside.parent if outside.name == "bin" else outside
         hint = f"; it is there, but the test does not see it: write 'sandbox: {{read: [{folder}]}}' in dodo.yml"
     return f"service '{service}' could not be started: {why}{hint}"
-
-
-def lost_messages(service: PlannedService, messages: int) -> str:
-    """A sentence on a service whose receive buffer was full, and on what that means."""
-    meaning = "it worked without them"
-    if any(flag.kind == "report" for flag in service.flags):
-        meaning = "the recording is incomplete"
-    elif service.judge:
-        meaning = "its verdict does not consider them"
-    count = f"{messages} message{'s' * (messages != 1)}"
-    return f"service '{service.name}' lost {count}, because its receive buffer was full: {meaning}"
-
-
-def deaf(services: Sequence[str], patience_s: float) -> str:
-    """A sentence on services of the application that consume messages, but have no socket for them."""
-    names = " and ".join(f"'{name}'" for name in services)
-    which = f"{names}, which consume{'s' * (len(services) == 1)} messages, had"
-    return f"{which} not joined the bus after {patience_s:g} s: what others sent before is lost"
 
 
 def flooded(plan: Plan, event: Flooded) -> Finding:

@@ -11,17 +11,7 @@ from dodo_dsl.plan.added_services import CLOCK, RECORDER, TIME
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import start_order
 from dodo_dsl.run.machine_load.judgement import JudgedFigures, consider
-from dodo_dsl.run.outcomes import (
-    Cause,
-    Facts,
-    Finding,
-    decide,
-    flooded,
-    how_it_ended,
-    lost_messages,
-    outcome_of,
-    unstartable,
-)
+from dodo_dsl.run.outcomes import Cause, Finding, decide, flooded, how_it_ended, outcome_of, unstartable
 from dodo_dsl.run.protocol import (
     Event,
     Exited,
@@ -57,7 +47,7 @@ def _how(event: Exited) -> str:
 
 
 class Ended(Exception):
-    """The test is over; what decided it is among the facts."""
+    """The test is over; what decided it is among the findings."""
 
 
 @dataclass
@@ -66,7 +56,10 @@ class RunState:
 
     plan: Plan
     clock: Callable[[], float]
-    facts: Facts = field(init=False)
+    findings: list[Finding] = field(default_factory=list)
+    verdicts: dict[str, list[VerdictEvent]] = field(init=False)
+    first_application: str = field(init=False)
+    """Whose last lines may explain why there is no answer."""
     layer_of: dict[str, str] = field(default_factory=dict)
     exits: dict[str, int] = field(default_factory=dict)
     ready: set[str] = field(default_factory=set)
@@ -90,7 +83,8 @@ class RunState:
     _unmatched: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
+        self.first_application = next((s.name for s in self.plan.application.services), "")
+        self.verdicts = {s.name: [] for s in self.plan.services if s.judge}
 
     def test_s(self) -> float:
         if self.plan.lockstep:
@@ -98,27 +92,23 @@ class RunState:
         return 0.0 if self.began is None else (self.finished or self.clock()) - self.began
 
     def all_evaluators_ended(self) -> bool:
-        return all(name in self.exits for name in self.facts.evaluators)
+        return self.verdicts.keys() <= self.exits.keys()
 
     def add_finding(self, result: Result, reason: str, service: str = "") -> None:
-        self.facts.findings.append(Finding(result, reason, service))
+        self.findings.append(Finding(result, reason, service))
 
     def end(self, result: Result, reason: str, service: str = "", cause: Cause = "") -> None:
         """Adds a finding with which the test is over: raises Ended."""
         self._end_with(Finding(result, reason, service, cause))
 
     def _end_with(self, finding: Finding) -> None:
-        self.facts.findings.append(finding)
+        self.findings.append(finding)
         raise Ended
 
     def time_out(self) -> None:
         """The test's time is over, and an evaluator has not ended: raises Ended."""
-        late = next(name for name in self.facts.evaluators if name not in self.exits)
-        self.end(
-            "error",
-            f"evaluator '{late}' gave no verdict within the timeout of {self.plan.timeout_s:g} s",
-            late,
-        )
+        late = next(name for name in self.verdicts if name not in self.exits)
+        self.end("error", f"evaluator '{late}' gave no verdict within the timeout of {self.plan.timeout_s:g} s", late)
 
     def take(self, event: Event) -> None:
         """Remembers an event; raises Ended when the test is over with it."""
@@ -126,7 +116,7 @@ class RunState:
             case VerdictEvent(service) if self.began is None:
                 self.end("error", f"evaluator '{service}' gave a verdict before the test began", service)
             case VerdictEvent(service):
-                self.facts.verdicts.setdefault(service, []).append(event)
+                self.verdicts[service].append(event)
             case Malformed(service, problem):
                 self.end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)
             case Unstartable(service, why):
@@ -138,7 +128,7 @@ class RunState:
             case MemoryTaken(service, text):  # no busy machine takes as long
                 self.end("failed", f"the application keeps service '{service}' from its shared memory: {text}", service)
             case Foreign(reason):
-                self.end("failed", reason, self._first_application())
+                self.end("failed", reason, self.first_application)
             case Stopped():
                 self._take_stop(event)
             case Exited(service, code):
@@ -178,7 +168,7 @@ class RunState:
         if event.how == "timedout":
             self.time_out()
         if event.how == "unanswered":
-            self._end_with(Finding("failed", event.reason, self._first_application(), "silence", event.silent))
+            self._end_with(Finding("failed", event.reason, self.first_application, "silence", event.silent))
         self.end("error", event.reason, CLOCK)
 
     def note_end(self, event: Exited, is_asked: bool) -> None:
@@ -202,7 +192,7 @@ class RunState:
             is_done = (code == 0 and self.input_ended) or start_order.may_end(
                 self.plan.application.services, service, code
             )
-            if not is_done and not self._all_verdicts_given():
+            if not is_done and not all(self.verdicts.values()):
                 reason = f"application service '{service}' {ended}, before the test was decided"
                 self.end("failed", reason, service, "end")
             if not is_done:
@@ -211,13 +201,13 @@ class RunState:
             self.end("error", f"service '{service}' of layer {layer} {ended}", service, "end")
         elif service not in self.ready and self.began is None:
             self.end("error", f"service '{service}' of layer {layer} {ended}, before it was ready", service, "end")
-        elif service in self.facts.evaluators and not self.facts.verdicts.get(service):
+        elif self.verdicts.get(service) == []:
             reason = f"evaluator '{service}' ended without a verdict {when}".rstrip()
             self.end("error", reason, service, "end")
 
     @property
     def finding(self) -> Finding:
-        return decide(self.facts)
+        return decide(self.plan, self.findings, self.verdicts)
 
     def _details(self, finding: Finding, cid: int) -> list[str]:
         """What helps to understand why a test ended so, behind the reason; ``cid`` is that of its bus."""
@@ -232,9 +222,6 @@ class RunState:
             details.append(told_in_words(self.plan.told))
         return list(filter(None, details))
 
-    def _all_verdicts_given(self) -> bool:
-        return all(self.facts.verdicts.get(name) for name in self.facts.evaluators)
-
     def _when(self) -> str:
         if self.began is None:
             return "during set-up"
@@ -247,13 +234,9 @@ class RunState:
             return finding
         return replace(finding, reason=f"{finding.reason}, after {self.time.seconds:.1f} s of test time")
 
-    def _first_application(self) -> str:
-        """The application's service whose last lines may explain why there is no answer."""
-        return next((s.name for s in self.plan.application.services), "")
-
     def keep_tails(self, backend: Backend) -> None:
         """The test is decided: what services write from now on, because they are being ended, explains nothing."""
-        names = {*self.layer_of, *self.facts.evaluators, *(finding.service for finding in self.facts.findings)}
+        names = {*self.layer_of, *self.verdicts, *(finding.service for finding in self.findings)}
         self._tails = {name: tuple(backend.tail(name)) for name in names}
         self._unmatched = backend.unmatched()
 
@@ -263,13 +246,15 @@ class RunState:
         figures = JudgedFigures()
         figures.judge_answers(self.response, plan.lockstep, services)
         figures.judge_use(self.resources, plan.resources)
-        verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
+        verdicts = [verdict for each in self.verdicts.values() for verdict in each]
         judged = [check for verdict in verdicts for check in verdict.checks]
-        considered, load = consider(decide(self.facts, figures.findings), self._load())
+        decided = decide(plan, self.findings, self.verdicts, figures.findings)
+        considered, load = consider(decided, self._load())
         found = self._timed(considered)
         graph = [] if found.result == "passed" else self.graph[:_MOST_OF_GRAPH]
         finding = replace(found, reason="; ".join([*graph, found.reason, *self._details(found, backend.cid)]))
-        losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
+        full = "because its receive buffer was full"
+        losses = (f"service '{name}' lost {count} messages, {full}" for name, count in sorted(self.lost.items()))
         return replace(
             outcome_of(plan, finding, backend.name, backend.cid),
             setup_s=self.setup_s,

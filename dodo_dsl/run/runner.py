@@ -15,7 +15,7 @@ from dodo_dsl.plan.added_services import PICTURES_FILE
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
-from dodo_dsl.run.outcomes import describe, error_outcome, error_reason, system_error
+from dodo_dsl.run.outcomes import describe, error_outcome
 from dodo_dsl.run.rigs.pool import opened
 from dodo_dsl.run.schedule import CorePool, Schedule
 
@@ -137,7 +137,7 @@ class Runner:
         except asyncio.CancelledError:
             return None
         except Exception as error:  # noqa: BLE001  (one job must not cost the results of the others)
-            return error_outcome(job.plan, self.backends.name, error_reason(error, job.report))
+            return error_outcome(job.plan, self.backends.name, describe(error, job.report))
 
     async def _again(self, job: Job, first: Outcome) -> Outcome:
         """The outcome of a test for which the machine was too busy."""
@@ -177,7 +177,7 @@ class Runner:
         except FileNotFoundError:  # it reported nothing
             return ""
         except OSError as error:
-            return f"because its report cannot be moved: {system_error(error)}"
+            return f"because its report cannot be moved: {error.filename}: {error.strerror}"
         return ""
 
     async def _attempt(self, job: Job) -> Outcome:
@@ -198,7 +198,7 @@ class Runner:
                     outcome = replace(outcome, notes=(*outcome.notes, f"ran on rig '{chosen.plan.rig}'"))
         except Exception as error:  # noqa: BLE001  (whatever it is, it concerns this test alone)
             if outcome is None:
-                return error_outcome(job.plan, self.backends.name, error_reason(error, job.report))
+                return error_outcome(job.plan, self.backends.name, describe(error, job.report))
             return replace(
                 outcome, notes=(*outcome.notes, f"not all of the test was taken down: {describe(error, job.report)}")
             )

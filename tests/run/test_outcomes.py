@@ -5,12 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.plan.model import Application, ApplicationService
+from dodo_dsl.plan.model import ENDS_INPUT, Application, ApplicationService, Flag
 from dodo_dsl.run.outcomes import (
-    Facts,
     Finding,
     decide,
-    error_reason,
+    describe,
     how_it_ended,
     unstartable,
 )
@@ -18,19 +17,19 @@ from dodo_dsl.run.protocol import VerdictEvent
 from tests.run.scripted import plan
 
 
-def verdict(name: str, passed: bool) -> VerdictEvent:
-    return VerdictEvent(name, passed, f"{name} {passed}", ())
-
-
 def test_verdicts_are_findings() -> None:
-    facts = Facts(("a", "b"), [], {"b": [verdict("b", True)], "a": [verdict("a", True)]})
-    assert decide(facts) == Finding("passed", "a True; b True", "a")
-    facts.verdicts["b"] = [verdict("b", False)]
-    assert decide(facts) == Finding("failed", "b False", "b", cause="verdict")
-    facts.verdicts["a"] *= 2
-    assert decide(facts) == Finding("error", "evaluator 'a' gave 2 verdicts, expected one", "a")
-    facts.findings.append(Finding("error", "the engine is gone"))
-    assert decide(facts).reason == "the engine is gone", "what the engine saw comes first"
+    """The first of the worst, of evaluators that which ends the drive; what the engine saw comes before them."""
+    good, bad = VerdictEvent("a", True, "fine", ()), VerdictEvent("b", False, "far", ())
+    late = VerdictEvent("c", False, "late", ())
+    tested = plan(evaluators="abc")
+    assert decide(tested, [], {"a": [good], "b": [replace(bad, passed=True)]}).reason == "fine; far"
+    said = {"a": [good], "b": [bad], "c": [late]}
+    assert decide(tested, [], said) == Finding("failed", "far", "b", cause="verdict")
+    ending = replace(tested.services[-1], flags=(Flag(ENDS_INPUT, "true"),))
+    until = replace(tested, services=(*tested.services[:-1], ending))
+    assert decide(until, [], said).service == "c"
+    assert decide(tested, [], {**said, "a": [good, good]}).reason == "evaluator 'a' gave 2 verdicts, expected one"
+    assert decide(tested, [Finding("error", "no engine")], {**said, "a": [good, good]}).reason == "no engine"
 
 
 @pytest.mark.parametrize(
@@ -79,7 +78,7 @@ def test_a_program_outside_of_what_a_test_sees_has_to_be_named(tmp_path: Path) -
 
 
 def test_an_internal_error_leaves_its_traceback(tmp_path: Path) -> None:
-    reason = error_reason(KeyError("a\nb" + "c" * 1000), tmp_path)
+    reason = describe(KeyError("a\nb" + "c" * 1000), tmp_path)
     assert reason.startswith("internal error: KeyError: 'a\\nbccc")
     assert reason.endswith("ccc (traceback in logs/runner.log)")
     assert len(reason) < 400

@@ -205,7 +205,7 @@ def test_errors_alone_are_retried(
     ("problem", "reason"),
     [
         (BackendError("no subnet is free"), "no subnet is free"),
-        (OSError(24, "Too many open files"), "this machine cannot run the test: Too many open files"),
+        (OSError(24, "Too many open files"), "this machine says: Too many open files"),
         (ValueError("odd"), "internal error: ValueError: odd (traceback in logs/runner.log)"),
     ],
     ids=["backend", "system", "internal"],
@@ -221,7 +221,7 @@ def test_an_error_of_one_job_is_its_outcome_alone(scene: Scene, problem: Excepti
 @pytest.mark.parametrize(
     ("problem", "note"),
     [
-        (OSError(28, "No space left on device"), "No space left on device"),
+        (OSError(28, "No space left on device"), "this machine says: No space left on device"),
         (ValueError("odd"), "internal error: ValueError: odd (traceback in logs/runner.log)"),
     ],
     ids=["system", "internal"],
