@@ -2,6 +2,7 @@
 
 import argparse
 import asyncio
+import contextlib
 import gc
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -231,7 +232,8 @@ def run(
             def draw(job: Job, outcome: Outcome) -> None:
                 drawn.append(pool.submit(draw_test, target.folder, outcome, job.plan, job.folder))
 
-            outcomes = asyncio.run(runner.run(jobs, draw))
+            with contextlib.closing(runner.backends):
+                outcomes = asyncio.run(runner.run(jobs, draw))
         not_run = runner.not_run()
         plans = {job.plan.slug: job.plan for job in jobs}
         about = {s: run_report.Reported(p, target.folder / s, report / s) for s, p in plans.items()}

@@ -21,7 +21,7 @@ from dodo_dsl.run.backends import CombinedBackends
 from dodo_dsl.run.process.fork_server import ForkServer
 from dodo_dsl.run.schedule import Schedule
 from dodo_dsl.run.work_folder import WorkFolder, reap_folders, work_folder
-from dodo_dsl.search.drives import Drives, KeptBackends, end_like_interrupt
+from dodo_dsl.search.drives import Drives, end_like_interrupt
 from dodo_dsl.search.store import Store
 from dodo_dsl.search.study import Study
 from dodo_dsl.spec.load import Settings
@@ -76,7 +76,7 @@ class SearchSession:
         )  # fmt: skip
         order = Schedule(options.jobs)
         progress = _Lines(self.stdout)
-        return Drives(study.checked, store, KeptBackends(backends), order, self.folder.path, progress, folder, shared)
+        return Drives(study.checked, store, backends, order, self.folder.path, progress, folder, shared)
 
 
 @contextmanager

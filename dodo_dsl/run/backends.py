@@ -4,10 +4,9 @@ import asyncio
 import contextlib
 import tempfile
 from collections.abc import AsyncIterator, Sequence
-from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.process import host_isolation
@@ -50,25 +49,6 @@ class Job:
     others: tuple["Job", ...] = ()
     work: Path = field(default_factory=lambda: Path(tempfile.gettempdir()))
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "test", self.test or self.plan.slug)
-
-
-class Backends(Protocol):
-    """Makes backends; ``prepare`` is called once before the first."""
-
-    name: str
-
-    async def prepare(self, plans: Sequence[Plan], note: Say) -> None: ...
-
-    def close(self) -> None:
-        """All tests are over; called once at the end."""
-        ...
-
-    def open(self, job: Job, say: Say, keep: bool) -> AbstractAsyncContextManager[Backend]:
-        """A backend for one test; raises BackendError when none is available."""
-        ...
-
 
 @dataclass
 class CombinedBackends:
@@ -85,6 +65,7 @@ class CombinedBackends:
     descriptors: tuple[int, ...] = ()
     fork_server: ForkServer | None = None
     _kinds: "list[Processes | Containers]" = field(default_factory=list)
+    _is_prepared: bool = False
     _alone: asyncio.Lock = field(default_factory=asyncio.Lock)
     """A queue without time limit for tests of this run that need the machine for themselves."""
 
@@ -99,8 +80,10 @@ class CombinedBackends:
             self._kinds.append(Containers(self.subnets, is_whole))
 
     async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
-        for kind in self._kinds:
+        """Called before each round of tests, of which the first counts."""
+        for kind in () if self._is_prepared else self._kinds:
             await kind.prepare(plans, note)
+        self._is_prepared = True
 
     def close(self) -> None:
         for kind in self._kinds:
@@ -109,6 +92,7 @@ class CombinedBackends:
 
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
+        """A backend for one test; raises BackendError when none is available."""
         plan = job.plan
         isolation = "host" if plan.is_real else self.isolation or plan.isolation
         refuse_unattended(plan)

@@ -13,7 +13,7 @@ from dodo_dsl.application import secret_variables
 from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.plan.added_services import PICTURES_FILE
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.backends import Backends, Job
+from dodo_dsl.run.backends import CombinedBackends, Job
 from dodo_dsl.run.engine import Engine
 from dodo_dsl.run.outcomes import describe, error_outcome
 from dodo_dsl.run.rigs.pool import opened
@@ -57,7 +57,7 @@ class Runner:
     """
 
     def __init__(
-        self, progress: Progress, backends: Backends, schedule: Schedule, policy: Policy, keep: bool = False
+        self, progress: Progress, backends: CombinedBackends, schedule: Schedule, policy: Policy, keep: bool = False
     ) -> None:
         self.progress = progress
         self.backends = backends
@@ -93,13 +93,9 @@ class Runner:
         await self.backends.prepare([job.plan for job in jobs], self.progress.note)
         self._waiting = self.schedule.ordered(jobs)
         tasks = {job.plan.slug: asyncio.ensure_future(self._one(job)) for job in self._waiting}
-        try:
-            with _signals_call(lambda: self._interrupt(tasks)):
-                await asyncio.gather(*tasks.values())
-                outcomes = [tasks[job.plan.slug].result() for job in jobs]
-        finally:
-            self.backends.close()
-        return [outcome for outcome in outcomes if outcome is not None]
+        with _signals_call(lambda: self._interrupt(tasks)):
+            await asyncio.gather(*tasks.values())
+        return [outcome for job in jobs if (outcome := tasks[job.plan.slug].result()) is not None]
 
     def _interrupt(self, tasks: Mapping[str, "asyncio.Task[Outcome | None]"]) -> None:
         if not self.interrupted:

@@ -4,7 +4,7 @@ import asyncio
 import random
 import shutil
 import signal
-from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
+from collections.abc import Coroutine, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,7 @@ from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.emit.output_folder import write
 from dodo_dsl.outcome import Outcome, failed_checks, worst_margin
-from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.backends import Backends, Job
-from dodo_dsl.run.protocol import Say
+from dodo_dsl.run.backends import CombinedBackends, Job
 from dodo_dsl.run.runner import Policy, Progress, Runner
 from dodo_dsl.run.schedule import Schedule
 from dodo_dsl.search.space import texts
@@ -36,22 +34,6 @@ _RETRIES = 1
 
 class Interrupted(Exception):
     """Ctrl-C or a signal ended the drives; everything until then is kept."""
-
-
-class KeptBackends:
-    """Backends for several rounds: prepared before the first one, and closed by ``end``."""
-
-    def __init__(self, backends: Backends) -> None:
-        self.name, self.open, self.end = backends.name, backends.open, backends.close
-        self._prepare: Callable[[Sequence[Plan], Say], Awaitable[None]] | None = backends.prepare
-
-    async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
-        prepare, self._prepare = self._prepare, None
-        if prepare:
-            await prepare(plans, note)
-
-    def close(self) -> None:
-        """The next round needs them."""
 
 
 def end_like_interrupt() -> None:
@@ -92,7 +74,7 @@ class Drives:
 
     checked: compiler.Checked
     store: Store
-    backends: KeptBackends
+    backends: CombinedBackends
     order: Schedule
     work: Path
     progress: Progress
@@ -106,7 +88,7 @@ class Drives:
         except (Interrupted, KeyboardInterrupt):
             return True
         finally:
-            self.backends.end()
+            self.backends.close()
         return False
 
     async def drive(self, points: Sequence[SearchPoint], first: int) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan, PlannedService
-from dodo_dsl.run.backends import Backends, CombinedBackends, Job
+from dodo_dsl.run.backends import CombinedBackends, Job
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import Schedule
 from tests.run import scripted
@@ -113,7 +113,7 @@ class Bench:
         return [Job(plan, self.folder / "compiled", self.folder / "report" / plan.slug) for plan in plans]
 
     def run(
-        self, *plans: Plan, parallel: int = 4, policy: Policy | None = None, backends: Backends | None = None
+        self, *plans: Plan, parallel: int = 4, policy: Policy | None = None, backends: CombinedBackends | None = None
     ) -> list[Outcome]:
         """The outcomes; on the host with CIDs that no other test uses."""
         with reserved_cids(len(plans)) as cids:
@@ -121,7 +121,8 @@ class Bench:
             if self.isolation == "host":
                 plans = tuple(replace(plan, cid=cids[0]) for plan in plans)
             self.runner = Runner(self.progress, backends, Schedule(parallel), policy or Policy())
-            return asyncio.run(self.runner.run(self.jobs(*plans)))
+            with contextlib.closing(backends):
+                return asyncio.run(self.runner.run(self.jobs(*plans)))
 
     def log(self, plan: Plan, name: str) -> str:
         return (self.folder / "report" / plan.slug / "logs" / f"{name}.log").read_text()
