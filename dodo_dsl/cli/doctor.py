@@ -25,9 +25,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.clean:
         reap_folders()
-        reaped = capabilities.clean()
-        stderr.writelines(f"removed: {printable(line)}\n" for line in reaped.removed)
-        stderr.writelines(f"cannot be removed: {printable(line)}\n" for line in reaped.left)
+        removed, left = capabilities.clean()
+        stderr.writelines(f"removed: {printable(line)}\n" for line in removed)
+        stderr.writelines(f"cannot be removed: {printable(line)}\n" for line in left)
     findings = capabilities.examine()
     if options.json:
         stdout.write(json_text([dataclasses.asdict(f) for f in findings]))

@@ -15,7 +15,6 @@ from dodo_dsl.run import leases
 from dodo_dsl.run.docker import cleanup
 from dodo_dsl.run.docker.client import NoEngine, connect
 from dodo_dsl.run.process import host_isolation, leftovers
-from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.leases import all_quarantined
 from dodo_dsl.run.rigs.problems import RigProblem
 
@@ -148,12 +147,10 @@ def _findings(check: Callable[[], Iterator[Capability]]) -> Iterator[Capability]
         yield Capability(check.__name__.replace("_", " "), "problem", f"cannot be examined: {error}")
 
 
-def clean() -> cleanup.Reaped:
+def clean() -> tuple[list[str], list[str]]:
     """Removes what killed runs left, as the next run would; returns what was removed, and what could not be."""
-    on_host = leftovers.reap()
-    try:
-        with contextlib.closing(connect()) as client:
-            reaped = cleanup.reap_projects(client)
-    except BackendError:
-        return cleanup.Reaped(on_host)
-    return cleanup.Reaped([*on_host, *reaped.removed], reaped.left)
+    removed, left = leftovers.reap(), list[str]()
+    with contextlib.suppress(NoEngine), contextlib.closing(connect()) as client:
+        of_engine, left = cleanup.reap_projects(client)
+        removed += of_engine
+    return removed, left

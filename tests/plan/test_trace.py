@@ -2,7 +2,6 @@
 
 import pytest
 
-from dodo_dsl.run.docker.compose import traced
 from tests.plan.plans import BASE
 
 
@@ -19,8 +18,3 @@ from tests.plan.plans import BASE
 def test_the_service_that_a_message_names(text: str, line: int | None) -> None:
     place = BASE.place_named_in(text)
     assert (place.line if place else None) == line
-
-
-def test_a_message_with_its_place() -> None:
-    assert traced(BASE, "camera failed") == "camera failed (tests/drive/drive.dodo.yml:8:3)"
-    assert traced(BASE, "driver failed") == "driver failed"

@@ -5,9 +5,8 @@ import os
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,30 +21,13 @@ from dodo_dsl.run.docker.client import engine_error
 PROJECT_LABEL = "com.docker.compose.project"
 SERVICE_LABEL = "com.docker.compose.service"
 _STOP_S = 2
+"""From SIGTERM to SIGKILL."""
 _RESTS_S = 0.5, 1.0, 2.0
 """Waits before removing once more what the engine refuses to: it may still be busy with a container that has ended."""
 
 
-@dataclass
-class Reaped:
-    """A phrase for each thing that killed runs left: those that were removed, and those that could not be."""
-
-    removed: list[str] = field(default_factory=list)
-    left: list[str] = field(default_factory=list)
-
-
 def _filters(project: str) -> dict[str, str]:
     return {"label": f"{PROJECT_LABEL}={project}"}
-
-
-def stop_project(client: Any, project: str) -> None:
-    """SIGTERM to all containers at once, SIGKILL to those that do not end within 2 s."""
-    containers = client.containers.list(filters=_filters(project))
-    with (
-        ThreadPoolExecutor(max_workers=max(1, len(containers))) as pool,
-        contextlib.suppress(DockerException, OSError),
-    ):
-        list(pool.map(lambda c: c.stop(timeout=_STOP_S), containers))
 
 
 def remove_project(client: Any, project: str, rests_s: Sequence[float] = _RESTS_S) -> int:
@@ -54,11 +36,14 @@ def remove_project(client: Any, project: str, rests_s: Sequence[float] = _RESTS_
     Goes on when one cannot be removed, tries it again after each of ``rests_s``, and raises the first such error at the
     end; raises OSError at once.
     """
-    removed, problem = 0, None
+    removed, filters, problem = 0, _filters(project), None
     for rest_s in (0.0, *rests_s):
         time.sleep(rest_s)
+        removals = [partial(c.remove, force=True, v=True) for c in client.containers.list(all=True, filters=filters)]
+        for kind in (client.networks, client.volumes):  # which no container may use any more
+            removals += [each.remove for each in kind.list(filters=filters)]
         problem = None
-        for remove in _removals(client, project):
+        for remove in removals:
             try:
                 remove()
                 removed += 1
@@ -72,45 +57,29 @@ def remove_project(client: Any, project: str, rests_s: Sequence[float] = _RESTS_
     raise problem
 
 
-def _removals(client: Any, project: str) -> Iterator[Callable[[], None]]:
-    """Containers come first: networks and volumes can only be removed when no container uses them."""
-    for container in client.containers.list(all=True, filters=_filters(project)):
-        yield partial(container.remove, force=True, v=True)
-    for network in client.networks.list(filters=_filters(project)):
-        yield partial(_remove_network, network)
-    yield from (volume.remove for volume in client.volumes.list(filters=_filters(project)))
-
-
-def _remove_network(network: Any) -> None:
-    """Removes a network, also where an endpoint is left of a container that is gone, or never started."""
-    network.reload()
-    for key, about in (network.attrs.get("Containers") or {}).items():
-        if key.startswith("ep-"):
-            network.disconnect(about["Name"], force=True)
-    network.remove()
-
-
-def reap_projects(client: Any) -> Reaped:
-    """Removes the projects of killed runs, whose lease nobody holds; what cannot be removed keeps its record."""
-    reaped = Reaped()
+def reap_projects(client: Any) -> tuple[list[str], list[str]]:
+    """A phrase for each project of a killed run, whose lease nobody holds: removed, or not, and then on record."""
+    removed, kept = [], []
     for lease in leases.orphans(leases.PROJECT):
         project, test = lease.name.removeprefix(leases.PROJECT), lease.left.get("test", "?")
         try:
             count = remove_project(client, project, rests_s=())
         except (DockerException, OSError) as error:
-            reaped.left.append(f"{test}: project {project}: {engine_error(error)}")
+            kept.append(f"{test}: project {project}: {engine_error(error)}")
             lease.leave()
             continue
         if count:
-            reaped.removed.append(f"{test}: {count} containers, networks and volumes")
+            removed.append(f"{test}: {count} containers, networks and volumes")
         lease.release()
-    return reaped
+    return removed, kept
 
 
 def take_down(client: Any, project: str, writers: Mapping[str, Any], report: Path, note: Callable[[str], None]) -> bool:
     """Whether everything was removed; ``writers`` are the containers with parts of the report."""
     try:
-        stop_project(client, project)
+        running = client.containers.list(filters=_filters(project))
+        with ThreadPoolExecutor(max(1, len(running))) as pool, contextlib.suppress(DockerException, OSError):
+            list(pool.map(lambda container: container.stop(timeout=_STOP_S), running))
         for name, container in writers.items():
             _copy_report(container.id, name, report, note)
         remove_project(client, project)

@@ -22,7 +22,7 @@ from dodo_dsl.application.interpolation import EnvironmentProblem, escaped, inte
 from dodo_dsl.application.model import FILES
 from dodo_dsl.emit.compose import CHANNEL
 from dodo_dsl.plan.added_services import ANSWERS_VARIABLE, RUNNER_VARIABLE, without_time
-from dodo_dsl.plan.model import LAYERS, Application, Plan
+from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run.application_files import application_paths, variables_of
 from dodo_dsl.run.docker.beside_processes import without_own
 from dodo_dsl.run.docker.builds import HiddenContext, is_built, own_contexts, private_images
@@ -34,18 +34,6 @@ from dodo_dsl.run.process.commands import needed_paths
 from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.run.rigs.ports import known_ports
 from dodo_dsl.run.sides import APPLICATION
-
-
-def traced(plan: Plan, text: str) -> str:
-    """The message, followed by the place in the spec of the service that it names."""
-    place = plan.place_named_in(text)
-    return f"{text} ({place.file}:{place.line}:{place.column})" if place else text
-
-
-def with_images(application: Application, variables: Mapping[str, str]) -> dict[str, Any]:
-    """The services of an application with the names of their images, empty for those that only a build makes."""
-    services: dict[str, Any] = application.compose.get("services") or {}
-    return {n: {**s, "image": interpolate(s.get("image") or "", variables)} for n, s in services.items()}
 
 
 def _write(file: Path, document: Mapping[str, Any]) -> None:
@@ -65,9 +53,6 @@ _SHARED = (
 )
 
 
-_LAYERS = tuple(layer for layer in LAYERS if layer != APPLICATION)
-
-
 @dataclass
 class Compose:
     """The test compiled into ``folder`` as a project; ``services`` are the application's after ``read``.
@@ -85,6 +70,7 @@ class Compose:
     is_whole: bool = True
     by_answers: bool = False
     services: dict[str, Any] = field(init=False)
+    """Of the application, with the names of their images, empty for those that only a build makes."""
     _binds: dict[str, list[Bind]] = field(init=False)
     _outside: dict[str, str] = field(default_factory=dict)
 
@@ -98,7 +84,8 @@ class Compose:
             raise BackendError(f"there is no program 'docker': {advice.DOCKER}")
         try:
             self._outside = variables_of(self.plan.application, self.folder)
-            self.services = with_images(self.plan.application, self._outside)
+            services = (self._application.get("services") or {}).items()
+            self.services = {n: {**s, "image": interpolate(s.get("image") or "", self._outside)} for n, s in services}
         except EnvironmentProblem as error:
             raise BackendError(str(error)) from error
         copies = self.plan.application.copies.items()
@@ -193,7 +180,7 @@ class Compose:
         with tempfile.TemporaryDirectory(prefix="dodo-compose-") as folder:
             own = Path(folder) / "application.compose.json"
             _write(own, document)
-            files = [*(f"{layer}.compose.yml" for layer in _LAYERS), str(own)]
+            files = [*(f"{layer}.compose.yml" for layer in LAYERS if layer != APPLICATION), str(own)]
             for subnet in subnets:
                 code, problem = await self.run("create", "--no-build", "--pull", "never", files=files, subnet=subnet)
                 if not code or _OVERLAP not in problem:
@@ -201,7 +188,7 @@ class Compose:
         if code:
             if unseen := _UNSEEN.search(problem):
                 raise BackendError(f"the Docker engine does not see '{unseen[1]}' of this machine: {_SHARED}")
-            raise BackendError(f"docker compose cannot create the test: {traced(self.plan, problem)}")
+            raise BackendError(f"docker compose cannot create the test: {problem}")
 
     def document(self) -> dict[str, Any]:
         """A compose file with the application, and where DoDo's services meet on this host; raises OSError."""

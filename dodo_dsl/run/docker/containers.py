@@ -38,11 +38,11 @@ class Containers:
             self._problem = str(error)
             return
         self._pulls = Pulls(self._client)
-        reaped = await asyncio.to_thread(cleanup.reap_projects, self._client)
-        for removed in reaped.removed:
-            note(f"removed what a killed run left: {removed}")
-        for left in reaped.left:
-            note(f"what a killed run left cannot be removed: {left}")
+        removed, left = await asyncio.to_thread(cleanup.reap_projects, self._client)
+        for text in removed:
+            note(f"removed what a killed run left: {text}")
+        for text in left:
+            note(f"what a killed run left cannot be removed: {text}")
 
     def problem(self, _plan: Plan, _isolation: str) -> str:
         """Why a test cannot run here, in a sentence; empty if it can."""

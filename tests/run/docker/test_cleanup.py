@@ -14,14 +14,6 @@ class Thing:
 
     def __init__(self, engine: "Engine", *errors: Exception) -> None:
         self._engine, self._errors = engine, list(errors)
-        self.endpoints: dict[str, dict[str, str]] = {}
-
-    def reload(self) -> None:
-        self.attrs = {"Containers": self.endpoints}
-
-    def disconnect(self, name: str, force: bool) -> None:
-        assert force
-        self.endpoints = {key: about for key, about in self.endpoints.items() if about["Name"] != name}
 
     def remove(self, **_: object) -> None:
         if self._errors:
@@ -77,11 +69,3 @@ def test_what_cannot_be_removed_at_once(
     with contextlib.nullcontext() if isinstance(expected, int) else pytest.raises(expected):
         assert cleanup.remove_project(Engine(*errors), "dodo-x", **more) == expected
     assert rests == waited
-
-
-def test_endpoints_of_containers_that_could_not_start_are_removed() -> None:
-    engine = Engine()
-    network = engine.things[0]
-    network.endpoints = {"ep-1": {"Name": "dodo-x-driver-1"}}
-    assert cleanup.remove_project(engine, "dodo-x") == 1
-    assert (engine.things, network.endpoints) == ([], {})
