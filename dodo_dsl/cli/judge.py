@@ -15,8 +15,7 @@ from dodo_dsl.outcome import Outcome, Result
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report import checks, results
 from dodo_dsl.run.judge import Judgement, judge
-from dodo_dsl.run.outcomes import Finding
-from dodo_dsl.run.protocol import VerdictEvent
+from dodo_dsl.run.protocol import Finding, VerdictEvent
 from dodo_dsl.run.test_recording import TestRecording, inspect
 from dodo_dsl.spec.load import Settings
 from dodo_dsl.terminal import json_text, printable

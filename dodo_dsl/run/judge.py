@@ -7,11 +7,11 @@ from pathlib import Path
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import service_protocol
-from dodo_dsl.run.outcomes import Finding, decide, how_it_ended
+from dodo_dsl.run.outcomes import decide, how_it_ended
 from dodo_dsl.run.process.commands import Commands
 from dodo_dsl.run.process.confinement import Command
 from dodo_dsl.run.process.slot import Slot
-from dodo_dsl.run.protocol import Malformed, Noted, VerdictEvent
+from dodo_dsl.run.protocol import Finding, Noted, VerdictEvent
 from dodo_dsl.run.test_recording import TestRecording
 
 NOT_OF_A_RECORDING = ("DODO_READERS", "DODO_RIG", "DODO_WORLD", "DODO_TOLD", "DODO_TRUTH")
@@ -45,9 +45,8 @@ def judge(plan: Plan, folder: Path, recording: TestRecording, cid: int, work: Pa
             match service_protocol.read(name, True, line):
                 case VerdictEvent() as verdict:
                     verdicts[name].append(verdict)
-                case Malformed(_, problem):
-                    text = f"the verdict of evaluator '{name}' is malformed: {problem}"
-                    findings.append(Finding("error", text, name))
+                case Finding() as finding:
+                    findings.append(finding)
                 case Noted(text):
                     notes.append(text)
         if process.returncode != 0:

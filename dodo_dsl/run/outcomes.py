@@ -5,39 +5,20 @@ import os
 import signal
 import traceback
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from dodo_dsl import atomic
 from dodo_dsl.check.wiring import ANYTHING
 from dodo_dsl.outcome import Outcome, Result
 from dodo_dsl.plan.added_services import FRAMES, RECORDER
 from dodo_dsl.plan.model import DISPLAY_SERVER, ENDS_INPUT, Plan, PlannedService
-from dodo_dsl.run.protocol import BackendError, Flooded, VerdictEvent
+from dodo_dsl.run.protocol import BackendError, Finding, Flooded, VerdictEvent
 from dodo_dsl.spec.manifest import load_manifests
 
 LOG = "logs/runner.log"
 """The traceback of an internal error, in the test's report."""
 _RANK: dict[Result, int] = {"passed": 0, "failed": 1, "error": 2}
 _MAX_ERROR_TEXT = 300
-Cause = Literal["", "verdict", "end", "silence", "start"]
-"""What decided: an evaluator, the end of a service, an application that did not answer the clock, or a program that
-could not be started; empty for anything else. A machine that is too busy may be the reason of the first three."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One thing that decides an outcome, and the service whose last lines explain it."""
-
-    result: Result
-    reason: str
-    service: str = ""
-    cause: Cause = ""
-    silent: bool = False
-    """Whether nothing came of the application, which may be on another bus."""
-
-
 Verdicts = Mapping[str, Sequence[VerdictEvent]]
 """What each evaluator of a test has said, in the order of its spec."""
 
@@ -108,8 +89,8 @@ def describe(error: Exception, report: Path) -> str:
     return f"internal error: {type(error).__name__}: {text}{more}"
 
 
-def unstartable(plan: Plan, service: str, why: str) -> str:
-    """A sentence on a service that could not be started; one by its path in the application's folder is built there."""
+def unstartable(plan: Plan, service: str, why: str) -> Finding:
+    """Of a service that could not be started; one by its path in the application's folder is built there."""
     programs = {own.name: own.process[0] for own in plan.application.services if own.process}
     program = programs.get(service, "")
     is_missing = why == f"{program}: {os.strerror(errno.ENOENT)}"
@@ -121,7 +102,7 @@ def unstartable(plan: Plan, service: str, why: str) -> str:
         outside = Path(*path.parts[path.parts.index("..") :]).parent
         folder = outside.parent if outside.name == "bin" else outside
         hint = f"; it is there, but the test does not see it: write 'sandbox: {{read: [{folder}]}}' in dodo.yml"
-    return f"service '{service}' could not be started: {why}{hint}"
+    return Finding("error", f"service '{service}' could not be started: {why}{hint}", service)
 
 
 def flooded(plan: Plan, event: Flooded) -> Finding:

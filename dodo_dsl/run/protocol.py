@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import UNSET, Meta, Struct, UnsetType
 
-from dodo_dsl.outcome import Amount, Check, Evidence, Response, Verdict
+from dodo_dsl.outcome import Amount, Check, Evidence, Response, Result, Verdict
 
 MOST_TEXT = 2000
 """Characters that a report can show."""
@@ -167,12 +167,21 @@ class VerdictEvent:
         }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Malformed:
-    """A message that should be a verdict and is not one."""
+Cause = Literal["", "verdict", "end", "silence"]
+"""What decided: an evaluator, the end of a service, or an application that did not answer the clock; empty for anything
+else."""
 
-    service: str
-    problem: str
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that decides an outcome, and the service whose last lines explain it."""
+
+    result: Result
+    reason: str
+    service: str = ""
+    cause: Cause = ""
+    silent: bool = False
+    """Whether nothing came of the application, which may be on another bus."""
 
 
 @dataclass(frozen=True)
@@ -184,18 +193,7 @@ class Exited:
     out_of_memory: bool = False
 
 
-@dataclass(frozen=True)
-class Unstartable:
-    service: str
-    why: str
-
-
-@dataclass(frozen=True)
-class Lost:
-    why: str
-
-
-Event = Message | VerdictEvent | Malformed | Exited | Unstartable | Lost | GraphFinding
+Event = Message | VerdictEvent | Finding | Exited | GraphFinding
 
 
 class BackendError(Exception):

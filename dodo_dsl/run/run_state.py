@@ -11,17 +11,17 @@ from dodo_dsl.plan.added_services import CLOCK, RECORDER, TIME
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import start_order
 from dodo_dsl.run.machine_load.judgement import JudgedFigures, consider
-from dodo_dsl.run.outcomes import Cause, Finding, decide, flooded, how_it_ended, outcome_of, unstartable
+from dodo_dsl.run.outcomes import decide, flooded, how_it_ended, outcome_of
 from dodo_dsl.run.protocol import (
+    Cause,
     Event,
     Exited,
+    Finding,
     Flooded,
     Foreign,
     GraphFinding,
     InputEnded,
     Late,
-    Lost,
-    Malformed,
     MemoryTaken,
     Noted,
     Overrun,
@@ -31,7 +31,6 @@ from dodo_dsl.run.protocol import (
     Started,
     Stopped,
     Time,
-    Unstartable,
     VerdictEvent,
 )
 from dodo_dsl.run.sides import Backend
@@ -117,12 +116,8 @@ class RunState:
                 self.end("error", f"evaluator '{service}' gave a verdict before the test began", service)
             case VerdictEvent(service):
                 self.verdicts[service].append(event)
-            case Malformed(service, problem):
-                self.end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)
-            case Unstartable(service, why):
-                self.end("error", unstartable(self.plan, service, why), service, "start")
-            case Lost(why):
-                self.end("error", why)
+            case Finding():
+                self._end_with(event)
             case Flooded():
                 self._end_with(flooded(self.plan, event))
             case MemoryTaken(service, text):  # no busy machine takes as long

@@ -17,9 +17,9 @@ from dodo_dsl.outcome import with_margin
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.protocol import (
     Event,
+    Finding,
     GivenVerdict,
     Late,
-    Malformed,
     Message,
     Noted,
     Ready,
@@ -49,7 +49,8 @@ def read(service: str, is_evaluator: bool, message: bytes) -> Event | None:
             return VerdictEvent(service, is_good, said.reason, checks, said.evidence, said.silent)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError) as error:
         problem = "its outcome is neither passed nor failed" if "$.outcome" in str(error) else str(error)
-        return Malformed(service, problem) if is_verdict else None
+        reason = f"the verdict of evaluator '{service}' is malformed: {problem}"
+        return Finding("error", reason, service) if is_verdict else None
     match said:
         case Noted(text=note):
             return Noted(f"service '{service}': {note}")

@@ -14,8 +14,9 @@ from dodo_dsl.application.ros_topics import BRIDGE
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.machine_load.service_use import Snapshot
+from dodo_dsl.run.outcomes import unstartable
 from dodo_dsl.run.printed_lines import PrintedLines, Send
-from dodo_dsl.run.protocol import Event, Exited, GraphFinding, Noted, Rested, Unstartable
+from dodo_dsl.run.protocol import Event, Exited, Finding, GraphFinding, Noted, Rested
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.service_protocol import Reports
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off, optional
@@ -69,13 +70,17 @@ class WatchedServices:
     def note(self, text: str) -> None:
         self.tell(Noted(text))
 
+    def lose(self, why: str) -> None:
+        """A side is gone, with what ran there."""
+        self.tell(Finding("error", why))
+
     def await_answers(self, why: str) -> None:
         """In lockstep the application cannot have the test's time."""
         self.by_answers = True
         self.note(f"lockstep by answers: {why}; timers and threads of the application may make its results differ")
 
     def not_started(self, name: str, why: str) -> None:
-        self.tell(Unstartable(name, why))
+        self.tell(unstartable(self.plan, name, why))
         self.conditions.failed(name)
 
     def ended(self, name: str, code: int, out_of_memory: bool) -> None:

@@ -7,13 +7,12 @@ import pytest
 
 from dodo_dsl.plan.model import ENDS_INPUT, Application, ApplicationService, Flag
 from dodo_dsl.run.outcomes import (
-    Finding,
     decide,
     describe,
     how_it_ended,
     unstartable,
 )
-from dodo_dsl.run.protocol import VerdictEvent
+from dodo_dsl.run.protocol import Finding, VerdictEvent
 from tests.run.scripted import plan
 
 
@@ -63,8 +62,8 @@ def test_exit_codes_in_words(code: int, words: str) -> None:
 )
 def test_a_program_that_is_not_there_has_to_be_built(program: str, why: str, hint: str) -> None:
     application = Application(".", (ApplicationService("app", (program, "--fast")),))
-    sentence = unstartable(replace(plan(), application=application), "app", why)
-    assert sentence == f"service 'app' could not be started: {why}{hint}"
+    found = unstartable(replace(plan(), application=application), "app", why)
+    assert found.reason == f"service 'app' could not be started: {why}{hint}"
 
 
 def test_a_program_outside_of_what_a_test_sees_has_to_be_named(tmp_path: Path) -> None:
@@ -72,9 +71,9 @@ def test_a_program_outside_of_what_a_test_sees_has_to_be_named(tmp_path: Path) -
     program.parent.mkdir(parents=True)
     (tmp_path / "app").mkdir()
     why = f"{tmp_path}/app/../ros/bin/python: No such file or directory"
-    assert "'sandbox: {read: [../ros]}'" not in unstartable(plan(), "app", why)
+    assert "'sandbox: {read: [../ros]}'" not in unstartable(plan(), "app", why).reason
     program.touch()
-    assert unstartable(plan(), "app", why).endswith("write 'sandbox: {read: [../ros]}' in dodo.yml")
+    assert unstartable(plan(), "app", why).reason.endswith("write 'sandbox: {read: [../ros]}' in dodo.yml")
 
 
 def test_an_internal_error_leaves_its_traceback(tmp_path: Path) -> None:

@@ -27,8 +27,9 @@ from dodo_dsl.run.docker.events import EventWatch
 from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, close, copy_into, type_into
 from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.machine_load.service_use import Snapshot
+from dodo_dsl.run.outcomes import unstartable
 from dodo_dsl.run.printed_lines import Send
-from dodo_dsl.run.protocol import BackendError, Exited, Lost, Ready, Unstartable
+from dodo_dsl.run.protocol import BackendError, Exited, Ready
 from dodo_dsl.run.sides import APPLICATION, WatchedServices
 
 _KILLED = 128 + signal.SIGKILL
@@ -61,7 +62,7 @@ class ContainerSide:
         self._out_of_memory: set[str] = set()
         self._is_closing = False
         self._kills: set[asyncio.Future[None]] = set()
-        self._events = EventWatch(self._take, lambda why: watched.tell(Lost(why)))
+        self._events = EventWatch(self._take, watched.lose)
         self._copied = asyncio.get_running_loop().create_future()
         """Whether the application has its own copies of the repository's files."""
         self.left_behind = False
@@ -159,7 +160,7 @@ class ContainerSide:
         elif action == "die" and name == SANDBOX and attributes.get("exitCode") == str(PAGE_DESTROYED):
             pass  # the clock says it
         elif action == "die":
-            self._watched.tell(Lost(f"the test's {name} ended unexpectedly"))
+            self._watched.lose(f"the test's {name} ended unexpectedly")
 
     def _take_memory_kill(self, name: str) -> None:
         """Ends a service of which the kernel killed a process for memory, because it may have been a child."""
@@ -240,7 +241,7 @@ class ContainerSide:
             return
         why = await self._watched.conditions.ill(name)
         if why and name not in self._watched.may_be_ill:
-            self._watched.tell(Unstartable(name, why))
+            self._watched.tell(unstartable(self._plan, name, why))
 
     def _start_container(self, name: str, again: bool = False) -> Any:
         """Starts a container, if need be twice; what it prints."""

@@ -16,7 +16,7 @@ from dodo_dsl.outcome import (
     with_margin,
 )
 from dodo_dsl.plan.model import Lockstep
-from dodo_dsl.run.outcomes import Finding
+from dodo_dsl.run.protocol import Finding
 from dodo_dsl.spec.model import ResourceLimits
 
 MOST_WAITED = 0.1

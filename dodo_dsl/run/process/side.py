@@ -29,7 +29,7 @@ from dodo_dsl.run.process.confinement import Command, Confinement, confinement
 from dodo_dsl.run.process.fork_server import ForkServer
 from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
-from dodo_dsl.run.protocol import BackendError, Lost, Ready, Say
+from dodo_dsl.run.protocol import BackendError, Ready, Say
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.sides import APPLICATION, Side, WatchedServices
 
@@ -122,7 +122,7 @@ class ProcessSide:
         self._exits: list[asyncio.Future[None]] = []
         self._asked: dict[str, asyncio.Future[Any]] = {}
         """What the sandbox is to answer, by what it is asked to do."""
-        self._sandbox = SandboxClient(self._take, lambda why: watched.tell(Lost(why)))
+        self._sandbox = SandboxClient(self._take, watched.lose)
 
     async def open(self, entered: int = 0) -> int:
         needed = [*needed_paths(self._plan, self._folder, self._report), Path(self._slot.channel)]

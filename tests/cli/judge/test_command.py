@@ -10,8 +10,7 @@ from dodo_dsl.cli.main import main
 from dodo_dsl.outcome import with_margin
 from dodo_dsl.plan.model import Application, Plan
 from dodo_dsl.run.judge import Judgement
-from dodo_dsl.run.outcomes import Finding
-from dodo_dsl.run.protocol import VerdictEvent
+from dodo_dsl.run.protocol import Finding, VerdictEvent
 from dodo_dsl.run.test_recording import TestRecording
 from tests.check import examples
 from tests.run.recorded.made import begin, message, step, write

@@ -12,7 +12,8 @@ from docker.errors import APIError
 from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.side import ContainerSide
-from dodo_dsl.run.protocol import Event, Exited, Noted, Ready, Unstartable
+from dodo_dsl.run.outcomes import unstartable
+from dodo_dsl.run.protocol import Event, Exited, Noted, Ready
 from dodo_dsl.run.sides import WatchedServices
 from tests.run.scripted import plan
 
@@ -73,7 +74,7 @@ def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] 
 
 @pytest.mark.parametrize(
     ("status", "last"),
-    [("healthy", [Ready("app")]), ("unhealthy", [Unstartable("app", "its healthcheck failed")])],
+    [("healthy", [Ready("app")]), ("unhealthy", [unstartable(plan(), "app", "its healthcheck failed")])],
 )
 def test_one_that_waits_for_others_has_its_own_health_awaited(status: str, last: list[Event], tmp_path: Path) -> None:
     waits, events = in_turn(tmp_path, ("db", "healthy"), ("app", status))
@@ -93,4 +94,4 @@ SLOW, BAD = "failed to create shim task: io pipe: context deadline exceeded", "f
 def test_what_a_busy_engine_does_not_start_is_started_once_more(problems: tuple[str, ...], tmp_path: Path) -> None:
     events = in_turn(tmp_path, ("db", "healthy"), ("app", "healthy"), app=Container(*problems))[1]
     notes = [Noted(f"the container of 'app' is started once more: {SLOW}")] * (problems[0] == SLOW)
-    assert events[2:] == [*notes, *[Unstartable("app", problems[-1])] * (problems != (SLOW,))]
+    assert events[2:] == [*notes, *[unstartable(plan(), "app", problems[-1])] * (problems != (SLOW,))]

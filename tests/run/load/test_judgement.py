@@ -20,7 +20,7 @@ from dodo_dsl.run.machine_load.judgement import (
     JudgedFigures,
     consider,
 )
-from dodo_dsl.run.outcomes import Finding
+from dodo_dsl.run.protocol import Finding
 from dodo_dsl.spec.model import ResourceLimits
 
 CALM = MachineLoad(

@@ -13,10 +13,10 @@ from dodo_dsl.opendlv.packets import RUNNER_SOCKET, Connection
 from dodo_dsl.outcome import Response
 from dodo_dsl.run.protocol import (
     Event,
+    Finding,
     Foreign,
     InputEnded,
     Late,
-    Malformed,
     Noted,
     Overrun,
     Paused,
@@ -116,7 +116,7 @@ MALFORMED = {
 @pytest.mark.parametrize("case", MALFORMED)
 def test_other_verdicts_are_malformed(case: str) -> None:
     found = read("track", True, MALFORMED[case])
-    assert isinstance(found, Malformed) and 0 < len(found.problem) < 200
+    assert isinstance(found, Finding) and 0 < len(found.reason) < 250
     assert read("camera", False, MALFORMED[case]) is None
 
 
