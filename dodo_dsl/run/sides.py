@@ -19,7 +19,7 @@ from dodo_dsl.run.printed_lines import PrintedLines, Send
 from dodo_dsl.run.protocol import Event, Exited, Finding, GraphFinding, Noted, Rested
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.service_protocol import Reports
-from dodo_dsl.run.start_order import Conditions, in_turn, one_off, optional
+from dodo_dsl.run.start_order import Conditions, one_off, optional
 
 APPLICATION = "application"
 """The layer that is not DoDo's."""
@@ -99,14 +99,17 @@ class WatchedServices:
         """
 
         async def when_met(name: str) -> None:
-            if why := await self.conditions.unmet(name, self.note):
-                self.not_started(name, why)
-            else:
-                await start(name)
+            try:
+                if why := await self.conditions.unmet(name, self.note):
+                    self.not_started(name, why)
+                else:
+                    await start(name)
+            except Exception as error:  # noqa: BLE001  (nobody awaits it)
+                self.not_started(name, f"{type(error).__name__}: {error}")
 
         waiting = [name for name in names if self.conditions.of(name)]
         await asyncio.gather(*(start(name) for name in names if name not in waiting))
-        self.turns |= {in_turn(when_met(name), partial(self.not_started, name)) for name in waiting}
+        self.turns |= {asyncio.ensure_future(when_met(name)) for name in waiting}
         ready = {*waiting, *reports} - self.may_be_ill
         return {name: name in ready for name in names}
 

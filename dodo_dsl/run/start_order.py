@@ -1,8 +1,8 @@
 """The order in which services of the application start: by the conditions of their ``depends_on``."""
 
 import asyncio
-from collections.abc import Callable, Coroutine, Iterable, Mapping
-from typing import Any
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping
 
 from dodo_dsl.plan.model import COMPLETED, HEALTHY, STARTED, ApplicationService
 from dodo_dsl.run.outcomes import how_it_ended
@@ -10,7 +10,7 @@ from dodo_dsl.run.outcomes import how_it_ended
 LONGEST_S = 600.0
 """The longest that a service waits for a condition to come true, in s, once the other one has started."""
 _ASKED = {STARTED: "start", HEALTHY: "be healthy", COMPLETED: "end with exit code 0"}
-_UNHEALTHY = "is unhealthy"
+UNHEALTHY = "is unhealthy"
 
 
 class Conditions:
@@ -20,27 +20,23 @@ class Conditions:
         services = tuple(services)
         self._after = {s.name: s.after for s in services}
         self._optional = {s.name: s.optional for s in services}
-        self._known: dict[tuple[str, str], asyncio.Future[str]] = {}
+        self._known: dict[tuple[str, str], asyncio.Future[str]] = defaultdict(asyncio.Future)
 
     def of(self, name: str) -> Mapping[str, str]:
         return self._after.get(name, {})
 
-    def started(self, name: str) -> None:
-        self._decide(name, STARTED, "")
-
-    def healthy(self, name: str) -> None:
-        self._decide(name, HEALTHY, "")
-
-    def unhealthy(self, name: str) -> None:
-        self._decide(name, HEALTHY, _UNHEALTHY)
+    def decide(self, name: str, condition: str, why: str = "") -> None:
+        """The condition of a service is true from now on; with ``why`` it never will be. The first word counts."""
+        if not (known := self._known[name, condition]).done():
+            known.set_result(why)
 
     def ended(self, name: str, code: int) -> None:
-        self._decide(name, HEALTHY, how_it_ended(code))
-        self._decide(name, COMPLETED, how_it_ended(code) if code else "")
+        self.decide(name, HEALTHY, how_it_ended(code))
+        self.decide(name, COMPLETED, how_it_ended(code) if code else "")
 
     def failed(self, name: str) -> None:
         for condition in _ASKED:
-            self._decide(name, condition, "could not be started")
+            self.decide(name, condition, "could not be started")
 
     async def unmet(self, name: str, note: Callable[[str], None]) -> str:
         """Waits until a service may start; why it never may, in a sentence, else empty.
@@ -48,10 +44,10 @@ class Conditions:
         ``note`` gets a sentence for each optional service without which it starts.
         """
         for other, asked in self.of(name).items():
-            why = await self._fact(other, STARTED)
+            why = await asyncio.shield(self._known[other, STARTED])
             try:
                 async with asyncio.timeout(LONGEST_S):
-                    why = why or await self._fact(other, asked)
+                    why = why or await asyncio.shield(self._known[other, asked])
                 why = why and f"which {why}"
             except TimeoutError:
                 why = f"and it did not within {LONGEST_S:g} s"
@@ -66,37 +62,10 @@ class Conditions:
         """Waits until a service that has started is healthy, or has ended; why it is neither, else empty."""
         try:
             async with asyncio.timeout(LONGEST_S):
-                why = await self._fact(name, HEALTHY)
+                why = await asyncio.shield(self._known[name, HEALTHY])
         except TimeoutError:
             return f"its healthcheck did not succeed within {LONGEST_S:g} s"
-        return "its healthcheck failed" if why == _UNHEALTHY else ""
-
-    def _fact(self, name: str, condition: str) -> "asyncio.Future[str]":
-        """Resolves to why the condition will not come true, empty when it has; not to be cancelled by waiters."""
-        return asyncio.shield(self._future(name, condition))
-
-    def _future(self, name: str, condition: str) -> "asyncio.Future[str]":
-        key = name, condition
-        if key not in self._known:
-            self._known[key] = asyncio.get_running_loop().create_future()
-        return self._known[key]
-
-    def _decide(self, name: str, condition: str, why: str) -> None:
-        future = self._future(name, condition)
-        if not future.done():
-            future.set_result(why)
-
-
-def in_turn(start: Coroutine[Any, Any, None], failed: Callable[[str], None]) -> "asyncio.Task[None]":
-    """Starts a service in its own task; ``failed`` gets what its exception says, because nobody awaits the task."""
-
-    def ended(task: asyncio.Task[None]) -> None:
-        if not task.cancelled() and (error := task.exception()) is not None:
-            failed(f"{type(error).__name__}: {error}")
-
-    task = asyncio.ensure_future(start)
-    task.add_done_callback(ended)
-    return task
+        return "its healthcheck failed" if why == UNHEALTHY else ""
 
 
 def one_off(services: Iterable[ApplicationService]) -> set[str]:

@@ -15,7 +15,7 @@ from docker.errors import APIError, DockerException
 from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import RECORDER
-from dodo_dsl.plan.model import HEALTHY
+from dodo_dsl.plan.model import HEALTHY, STARTED
 from dodo_dsl.run.application_time import PAGE_DESTROYED, POSIX_MEMORY
 from dodo_dsl.run.docker import beside_processes
 from dodo_dsl.run.docker.beside_processes import IMAGE
@@ -31,6 +31,7 @@ from dodo_dsl.run.outcomes import unstartable
 from dodo_dsl.run.printed_lines import Send
 from dodo_dsl.run.protocol import BackendError, Exited, Ready
 from dodo_dsl.run.sides import APPLICATION, WatchedServices
+from dodo_dsl.run.start_order import UNHEALTHY
 
 _KILLED = 128 + signal.SIGKILL
 """The exit code of a container whose program was killed by a signal that it cannot refuse."""
@@ -150,10 +151,10 @@ class ContainerSide:
             if action in ("health_status: healthy", "die") and not self._copied.done():
                 self._copied.set_result(action != "die")
         elif action == "health_status: healthy":
-            self._watched.conditions.healthy(name)
+            self._watched.conditions.decide(name, HEALTHY)
             self._watched.tell(Ready(name))
         elif action == "health_status: unhealthy":
-            self._watched.conditions.unhealthy(name)
+            self._watched.conditions.decide(name, HEALTHY, UNHEALTHY)
         elif action == "die" and name in self._watched.outputs:
             task = asyncio.ensure_future(self._died(name, int(attributes.get("exitCode", 1))))
             task.add_done_callback(lambda t: t.exception())
@@ -229,7 +230,7 @@ class ContainerSide:
             output.release_writer()
             self._watched.not_started(name, engine_error(error))
             return
-        self._watched.conditions.started(name)
+        self._watched.conditions.decide(name, STARTED)
         if has_terminal and self._watched.prints(name):
             output.type_in = partial(type_into, printed)
         arguments = printed, has_terminal, output.writer

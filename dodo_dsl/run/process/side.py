@@ -17,7 +17,7 @@ from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.ros_topics import BRIDGE
 from dodo_dsl.opendlv.relay import BUS
 from dodo_dsl.plan.added_services import TIME
-from dodo_dsl.plan.model import LAYERS, Plan
+from dodo_dsl.plan.model import HEALTHY, LAYERS, STARTED, Plan
 from dodo_dsl.run import application_time
 from dodo_dsl.run.application_files import application_paths
 from dodo_dsl.run.hidden_paths import hidden_paths, own_data
@@ -137,8 +137,8 @@ class ProcessSide:
 
     def _take(self, message: dict[str, Any]) -> None:
         if name := message.get("started"):
-            self._watched.conditions.started(name)
-            self._watched.conditions.healthy(name)  # as nothing asks for its health
+            for condition in (STARTED, HEALTHY):  # as nothing asks for its health
+                self._watched.conditions.decide(name, condition)
             if self._watched.conditions.of(name):
                 self._watched.tell(Ready(name))
         elif name := message.get("unstartable"):

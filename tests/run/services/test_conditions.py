@@ -1,13 +1,11 @@
 """When services of an application start, and what becomes of those that never may: without any process."""
 
-import asyncio
-from collections.abc import Coroutine
 from typing import Any
 
 import pytest
 
 from dodo_dsl.plan.model import COMPLETED, HEALTHY, STARTED, ApplicationService
-from dodo_dsl.run.start_order import Conditions, in_turn, may_end, optional
+from dodo_dsl.run.start_order import UNHEALTHY, Conditions, may_end, optional
 from tests.run.scripted import run
 
 DB = ApplicationService("db")
@@ -25,7 +23,7 @@ async def unmet(conditions: Conditions, notes: list[str]) -> tuple[str, list[str
     ("condition", "what", "why"),
     [
         (STARTED, ("failed", "db"), "to start (depends_on{}), which could not be started"),
-        (HEALTHY, ("unhealthy", "db"), "to be healthy (depends_on{}), which is unhealthy"),
+        (HEALTHY, ("decide", "db", HEALTHY, UNHEALTHY), "to be healthy (depends_on{}), which is unhealthy"),
         (COMPLETED, ("ended", "db", 3), "to end with exit code 0 (depends_on{}), which ended with exit code 3"),
         (COMPLETED, (), "to end with exit code 0 (depends_on{}), and it did not within 600 s"),
     ],
@@ -34,7 +32,7 @@ def test_one_that_never_may_start_unless_the_other_is_optional(condition: str, w
     async def waited(*optional: str) -> tuple[str, list[str]]:
         conditions = Conditions(app(condition, *optional))
         if what[:1] != ("failed",):
-            conditions.started("db")
+            conditions.decide("db", STARTED)
         if what:
             getattr(conditions, what[0])(*what[1:])
         return await unmet(conditions, [])
@@ -55,8 +53,8 @@ def test_which_services_a_test_can_do_without() -> None:
 @pytest.mark.parametrize(
     ("what", "why"),
     [
-        (("healthy",), ""),
-        (("unhealthy",), "its healthcheck failed"),
+        (("decide", HEALTHY), ""),
+        (("decide", HEALTHY, UNHEALTHY), "its healthcheck failed"),
         (("ended", 0), ""),
         ((), "its healthcheck did not succeed within 600 s"),
     ],
@@ -64,24 +62,9 @@ def test_which_services_a_test_can_do_without() -> None:
 def test_the_health_of_one_that_has_started(what: tuple[Any, ...], why: str) -> None:
     async def ill() -> str:
         conditions = Conditions(app(STARTED))
-        conditions.started("app")
+        conditions.decide("app", STARTED)
         if what:
             getattr(conditions, what[0])("app", *what[1:])
         return await conditions.ill("app")
 
     assert run(ill()) == why
-
-
-def test_an_exception_in_the_start_of_one_is_told() -> None:
-    async def start(error: type[BaseException] | None) -> None:
-        if error:
-            raise error("no such container")
-
-    async def told(start: Coroutine[Any, Any, None]) -> list[str]:
-        found: list[str] = []
-        await asyncio.wait([in_turn(start, found.append)])
-        await asyncio.sleep(0)
-        return found
-
-    errors = (KeyError, asyncio.CancelledError, None)
-    assert [run(told(start(error))) for error in errors] == [["KeyError: 'no such container'"], [], []]
