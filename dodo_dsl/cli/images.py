@@ -123,7 +123,7 @@ def _chosen(options: argparse.Namespace, shipped: Sequence[str], own: Mapping[st
 
 
 def _bake(names: Sequence[str], options: argparse.Namespace, stdout: TextIO) -> None:
-    """Builds images of DoDo's by their bake file; raises DockerError, WheelsError."""
+    """Builds images of DoDo's by their bake file; raises DockerError."""
     groups: dict[tuple[str, ...], list[str]] = {}
     for number, name in enumerate(names):  # the first alone, so that the others find its layers
         platforms = ["linux/amd64"] if name in _FOR_X86 and len(options.platform) > 1 else options.platform
@@ -145,10 +145,10 @@ def _bake(names: Sequence[str], options: argparse.Namespace, stdout: TextIO) -> 
 def _download(options: argparse.Namespace, folder: Path, stdout: TextIO) -> None:
     image = options.base_image or build_context.default_base_image()
     for platform in options.platform or [""]:
-        python = build_context.python_of(image, platform)
-        stdout.write(f"downloading packages for Python 3.{python.minor} on {python.machine} with pip\n")
+        minor, processor = build_context.python_of(image, platform)
+        stdout.write(f"downloading packages for Python 3.{minor} on {processor} with pip\n")
         stdout.flush()
-        build_context.download(python, folder)
+        build_context.download((minor, processor), folder)
 
 
 def _build_own(name: str, dockerfile: Path, options: argparse.Namespace) -> None:

@@ -7,11 +7,10 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import package_data
-from dodo_dsl.images import docker_command
+from dodo_dsl.images.docker_command import DockerError, ask
 
 BAKE = "services/docker-bake.hcl"
 _LOCK, _EXTRAS = "locks/base.txt", "locks/extras.txt"
@@ -44,39 +43,29 @@ _TAGS = [*(f"manylinux_2_{minor}" for minor in range(36, 16, -1)), "manylinux201
 _QUESTION = "import platform, sys; print(sys.version_info[1], platform.machine())"
 
 
-class WheelsError(Exception):
-    usage = False
-
-
-@dataclass(frozen=True)
-class Python:
-    """The Python of a base image: the minor version, and the machine such as ``aarch64``."""
-
-    minor: int
-    machine: str
+Python = tuple[int, str]
+"""That of a base image: the minor version, and the machine such as ``aarch64``."""
 
 
 def python_of(image: str, platform: str = "") -> Python:
-    """Asks an image, of a platform; the engine pulls it when it is missing. Raises WheelsError."""
+    """Asks an image, of a platform; the engine pulls it when it is missing. Raises DockerError."""
     words = ("--platform", platform) if platform else ()
     try:
-        answer = docker_command.ask(
-            "run", "--rm", *words, "--network", "none", "--entrypoint", "python3", image, "-c", _QUESTION
-        )
+        answer = ask("run", "--rm", *words, "--network", "none", "--entrypoint", "python3", image, "-c", _QUESTION)
         minor, machine = answer.split()
-        return Python(int(minor), machine)
-    except docker_command.DockerError as error:
+        return int(minor), machine
+    except DockerError as error:
         foreign = f" for {platform}, which this machine may not run without QEMU" if platform else ""
-        raise WheelsError(f"base image {image} does not run python3{foreign}: {error}") from None
+        raise DockerError(f"base image {image} does not run python3{foreign}: {error}") from None
     except ValueError:
-        raise WheelsError(f"base image {image} has no Python as expected, it says '{answer}'") from None
+        raise DockerError(f"base image {image} has no Python as expected, it says '{answer}'") from None
 
 
 def download(python: Python, folder: Path) -> None:
-    """Adds a wheel for each package of the images to a folder, all with its hashes; raises WheelsError."""
-    root = package_data.root()
+    """Adds a wheel for each package of the images to a folder, all with its hashes; raises DockerError."""
+    root, (_, machine) = package_data.root(), python
     locks = [(root / _LOCK).read_text(encoding="utf-8")]
-    if python.machine == "x86_64":
+    if machine == "x86_64":
         words = ("sh", root / _LOCKED, root / _OF_ROS, root / _LOCK, root / _EXTRAS)
         locks.append(subprocess.run(words, capture_output=True, text=True, check=True).stdout)
     for lock in locks:
@@ -87,12 +76,13 @@ def download(python: Python, folder: Path) -> None:
 
 
 def _download(python: Python, lock: str, folder: Path) -> None:
+    minor, machine = python
     words = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", "download"]
     words += ["--dest", str(folder), "--only-binary", ":all:", "--implementation", "cp", "--no-deps"]
-    words += ["--python-version", f"3.{python.minor}", "--require-hashes", "--requirement", lock]
-    words += [word for tag in _TAGS for word in ("--platform", f"{tag}_{python.machine}")]
+    words += ["--python-version", f"3.{minor}", "--require-hashes", "--requirement", lock]
+    words += [word for tag in _TAGS for word in ("--platform", f"{tag}_{machine}")]
     result = subprocess.run(words, capture_output=True, text=True, errors="replace", check=False)
     if result.returncode:
         said = [line.strip() for line in result.stderr.splitlines() if line.strip()]
         why = next((line for line in reversed(said) if line.startswith("ERROR")), said[-1] if said else "")
-        raise WheelsError(f"pip cannot download wheels for Python 3.{python.minor} on {python.machine}: {why}")
+        raise DockerError(f"pip cannot download wheels for Python 3.{minor} on {machine}: {why}")

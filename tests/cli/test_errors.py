@@ -11,7 +11,6 @@ from dodo_dsl.cli import errors
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.main import COMMANDS, main
 from dodo_dsl.cli.selection import NoSuchTest
-from dodo_dsl.images.build_context import WheelsError
 from dodo_dsl.images.docker_command import DockerError
 from dodo_dsl.opendlv.odvd import OdvdError
 from dodo_dsl.opendlv.recording import RecordingError
@@ -47,7 +46,7 @@ def test_errors_of_the_user(kind: type[Exception], monkeypatch: pytest.MonkeyPat
     assert ended(kind("it is so."), monkeypatch) == (2, "dodo list: it is so.\n")
 
 
-@pytest.mark.parametrize("kind", [DockerError, WheelsError, LeaseTimeout, RigProblem, SessionError])
+@pytest.mark.parametrize("kind", [DockerError, LeaseTimeout, RigProblem, SessionError])
 def test_errors_of_the_machine(kind: type[Exception], monkeypatch: pytest.MonkeyPatch) -> None:
     assert ended(kind("it is so"), monkeypatch, "doctor") == (3, "dodo doctor: it is so\n")
 
