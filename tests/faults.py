@@ -10,15 +10,11 @@ from dodo_dsl import atomic
 PAGE = Path(__file__).parents[1] / "docs" / "evidence.md"
 FAULTS = (
     "An image is missing",
-    "The connection breaks in the middle of a pull",
     "The engine goes away in the middle of a test",
     "The application is killed",
     "The application takes more memory than it may",
     "A child of the application takes more memory than it may",
     "A service of DoDo's is killed",
-    "An evaluator ends without a verdict",
-    "An evaluator gives two verdicts",
-    "An evaluator gives a malformed verdict",
     "A service never gets ready",
     "The disk with the report is full",
     "The runner is killed, and run again",

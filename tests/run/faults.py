@@ -17,7 +17,6 @@ name = sys.argv[2].partition("=")[2]
 memory = SharedMemory.create(name, 1000)
 print("memory", name, flush=True)
 """
-MAYBE = """print('{"dodo": "verdict", "outcome": "maybe"}', flush=True)\n"""
 LINES_A_SECOND = """
 count, begin = 0, time.monotonic()
 while True:
@@ -94,20 +93,6 @@ FAULTS = {
         ("process",),
         environment=READY + BEGUN + "os.kill(os.getpid(), 9)",
     ),
-    "no-verdict": Fault(
-        "An evaluator ends without a verdict",
-        "error",
-        "evaluator 'judge' ended without a verdict after",
-        ("process",),
-        judge=READY + BEGUN,
-    ),
-    "two-verdicts": Fault(
-        "An evaluator gives two verdicts",
-        "error",
-        "evaluator 'judge' gave 2 verdicts, expected one",
-        ("process",),
-        judge=READY + BEGUN + PASS + FAIL,
-    ),
     "own-verdict": Fault(
         "",
         "passed",
@@ -115,13 +100,6 @@ FAULTS = {
         ("process",),
         judge=DRIVES,
         application=FAIL + WAIT,
-    ),
-    "malformed": Fault(
-        "An evaluator gives a malformed verdict",
-        "error",
-        "the verdict of evaluator 'judge' is malformed: its outcome is neither passed nor failed",
-        ("process",),
-        judge=READY + BEGUN + MAYBE + WAIT,
     ),
     "many-lines": Fault(
         "The application logs 10,000 lines a second",

@@ -124,6 +124,15 @@ def test_a_docker_command_that_cannot_compose(folder: Path, monkeypatch: pytest.
         read(planned({}), folder)
 
 
+def test_what_the_engine_does_not_see_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = folder / "docker"
+    program.write_text("#!/bin/sh\necho 'invalid mount: bind source path does not exist: /own/far' >&2\nexit 1\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
+    with pytest.raises(BackendError, match="does not see '/own/far' of this machine: work in a folder that it has"):
+        asyncio.run(read(planned({"a": {"image": "a"}}), folder).create(["10.0.0.0/28"]))
+
+
 class EmptyEngine:
     """A client of an engine that has no image."""
 
