@@ -200,21 +200,17 @@ CASES: dict[str, tuple[list[tuple[float, Event]], str, str]] = {
     "passes": (PASSES, "passed", "it drove"),
     "fails": ([(1.0, FAILED), (1.0, ENDED)], "failed", "hit wall left"),
     "application ends with 0": ([(2.0, Exited("app", 0))], "failed", f"{APP} ended with exit code 0 {EARLY}"),
-    "application is killed": ([(2.0, Exited("app", -9))], "failed", f"{APP} was killed by SIGKILL {EARLY}"),
     "application is out of memory": ([(2.0, Exited("app", 137, True))], "failed", f"{APP} ran out of memory {EARLY}"),
     "application ends after the verdict": ([PASSES[0], (3.1, Exited("app", 3)), (3.2, ENDED)], "passed", "it drove"),
     "application ends after the input": ([OVER, GONE, *PASSES], "passed", "it drove"),
-    "application ends after the input, unfit": ([OVER, GONE, (2.0, FAILED), (2.0, ENDED)], "failed", "hit wall left"),
     "application crashes after the input": (
         [OVER, (2.0, Exited("app", 3)), *PASSES], "failed", f"{APP} ended with exit code 3 {EARLY}",
     ),
     "camera crashes": ([(2.0, Exited("camera", 1))], "error", f"{CAMERA} ended with exit code 1 after 2.0 s"),
-    "camera is killed": ([(2.0, Exited("camera", 143))], "error", f"{CAMERA} was killed by SIGTERM after 2.0 s"),
     "camera crashes after the verdict": (
         [(1.0, PASSED), (2.0, Exited("camera", 1)), (3.0, ENDED)],
         "error", f"{CAMERA} ended with exit code 1 after 2.0 s",
     ),
-    "recording runs out": ([(0.5, Exited("camera", 0)), *PASSES], "passed", "it drove"),
     "evaluator crashes after its verdict": (
         [(1.0, FAILED), (1.0, Exited("track", 2))], "error", f"{TRACK} ended with exit code 2 after 1.0 s",
     ),
@@ -228,7 +224,6 @@ CASES: dict[str, tuple[list[tuple[float, Event]], str, str]] = {
         "failed", "the application keeps service 'camera' from its shared memory: it is locked",
     ),
     "timeout": ([], "error", LATE),
-    "verdict without an end": ([(1.0, PASSED)], "error", LATE),
     "backend is gone": ([(1.0, Finding("error", "the engine went away"))], "error", "the engine went away"),
 }  # fmt: skip
 
@@ -399,7 +394,7 @@ def cancelled(backend: ScriptedBackend, *seconds: float) -> tuple[Outcome, float
     return run(scene())
 
 
-@pytest.mark.parametrize("when", [0.5, 1.5, 4.0], ids=["open", "ready", "running"])
+@pytest.mark.parametrize("when", [0.5, 4.0], ids=["open", "running"])
 def test_an_interrupt_is_an_error_after_teardown(when: float) -> None:
     backend = ScriptedBackend(plan(), drives(), {"open": 1.0, "close": 3.0})
     found, ended = cancelled(backend, when)
@@ -533,13 +528,6 @@ def test_the_bus_of_an_application_that_is_silent_on_the_test_s(
     monkeypatch.setattr(listeners, "buses", lambda processes: joined if list(processes) == [17] else set())
     verdict = VerdictEvent("track", False, "nothing came", (), silent=silent)
     assert begun((3.0, verdict), (3.1, ENDED)).reason == f"nothing came{told}"
-
-
-def test_nobody_looks_for_buses_on_the_machine_s_own_network(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(listeners, "buses", lambda _: {111})
-    said = VerdictEvent("track", False, "nothing came", (), silent=True)
-    events = {**READY, "begin": [(3.0, said), (3.1, ENDED)]}
-    assert outcome(ScriptedBackend(plan(), events, is_on_host=True)).reason == "nothing came; the test is on CID 131"
 
 
 @pytest.mark.parametrize(

@@ -87,26 +87,16 @@ MALFORMED = {
     "evidence list": line(evidence=[1]),
     "much evidence": line(evidence={f"a{n}": n for n in range(21)}),
     "evidence key": line(evidence={"No": 1}),
-    "long evidence key": line(evidence={"a" * 41: 1}),
     "evidence object": line(evidence={"x": {}}),
-    "evidence true": line(evidence={"x": True}),
     "infinite evidence": line(evidence={"x": float("inf")}),
-    "no number": line(evidence={"x": float("nan")}),
     "long evidence": line(evidence={"x": "a" * 201}),
-    "no evidence": line(evidence=None),
     **{f"no {key}": line(checks=[{k: v for k, v in CHECK.items() if k != key}]) for key in CHECK},
-    "no checks": line(checks=None),
     "unknown key": checked(more=1),
     "infinite": checked(value=float("inf")),
-    "huge": checked(value=int("1" * 400)),
-    "unit": checked(unit=3),
     "ok": checked(ok=1),
-    "exclusive": checked(exclusive=1),
     "limit": checked(limit={"most": 1}),
-    "limit that is none": checked(limit={"max": None}),
     "surrogate": line(reason="\ud800"),
     "empty reason": line(reason=""),
-    "long reason": line(reason="x" * 5000),
     "outcome": line(outcome="maybe"),
     "deep": b'{"dodo": "verdict", "checks": ' + b"[" * 30_000,
     "unfinished": line()[:-5],
@@ -121,16 +111,9 @@ def test_other_verdicts_are_malformed(case: str) -> None:
 
 
 RESPONSE = {
-    "answers": 3,
-    "period_s": 0.1,
-    "median_s": 0.01,
-    "p95_s": 0.02,
-    "worst_s": 0.03,
-    "slow": 0,
-    "over": 1,
-    "processor": "",
-    "uncopied": 2,
-}
+    "answers": 3, "period_s": 0.1, "median_s": 0.01, "p95_s": 0.02, "worst_s": 0.03, "slow": 0, "over": 1,
+    "processor": "", "uncopied": 2,
+}  # fmt: skip
 
 
 def response(**changes: object) -> str:
@@ -140,19 +123,14 @@ def response(**changes: object) -> str:
 CLOCKED = {
     response(): Responded(Response(**RESPONSE)),  # type: ignore[arg-type]
     response(answers=0): None,
-    response(slow=-1): None,
-    response(median_s=None): None,
     response(p95_s="0.1"): None,
-    response(uncopied=True): None,
     '{"dodo": "time", "seconds": 1.5}': Time(1.5, False),
     '{"dodo": "started"}': Started(),
     '{"dodo": "time", "seconds": 2, "last": true}': Time(2.0, True),
-    '{"dodo": "time", "seconds": null}': None,
     '{"dodo": "time"}': None,
     '{"dodo": "stopped", "how": "stuck", "reason": "x"}': Stopped("stuck", "x"),
     '{"dodo": "stopped", "how": "unanswered", "reason": "", "silent": true}': Stopped("unanswered", "", True),
     '{"dodo": "stopped", "how": "gone", "reason": "x"}': None,
-    '{"dodo": "stopped", "how": "stuck"}': None,
     '{"dodo": ["stopped"], "how": "stuck", "reason": "x"}': None,
 }
 
