@@ -100,13 +100,6 @@ def test_what_is_there_for_one_platform_is_built_for_that_alone(docker: Path) ->
     assert ros == "--set *.platform=linux/amd64 ros-bridge"
 
 
-def test_a_mistake_in_the_deployment_is_said(docker: Path, tmp_path: Path) -> None:
-    script(docker, HAS_NONE)
-    (tmp_path / "dodo.yml").write_text("dodo: 1\nimages: {prefix: [1]}\n")
-    code, said = run("build")
-    assert (code, "dodo.yml:2:" in said) == (Exit.USAGE, True)
-
-
 def test_builds_have_contexts_of_their_own(docker: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What a pipeline builds with bake holds no more than what a run builds, also with tests among its files."""
     root = docker.parent.parent / "a$b"

@@ -13,8 +13,9 @@ import pytest
 import yaml
 
 from dodo_dsl import __version__
+from dodo_dsl.cli.images import SHARED
 from dodo_dsl.spec.manifest import Manifest, load_manifests
-from tests.images.conftest import ROOT, docker, own_volume
+from tests.images.conftest import ROOT, SOURCE, docker, own_volume
 from tests.images.targets import folders_of, targets
 
 pytestmark = pytest.mark.engine
@@ -67,16 +68,17 @@ def test_there_is_an_image_for_each_service(built: dict[str, str]) -> None:
     assert set(built) == {"base", "geometry", "vision", "sandbox", "ros-bridge", *(m.image for m in MANIFESTS.values())}
 
 
-@each_service
-def test_labels_and_user(built: dict[str, str], manifest: Manifest) -> None:
-    about = config(built[manifest.image])
-    assert about["User"] == "10001:10001"
-    assert about["Labels"] == {
-        "org.opencontainers.image.title": manifest.image,
-        "org.opencontainers.image.version": __version__,
-        "org.opencontainers.image.source": "https://git.example.org/dodo",
-        "dodo.service": manifest.name,
-    }
+def test_labels_and_users(built: dict[str, str]) -> None:
+    """Shared stages do not pass for services."""
+    for image, reference in built.items():
+        about = config(reference)
+        assert about["User"] == "10001:10001"
+        assert about["Labels"] == {
+            "org.opencontainers.image.title": image,
+            "org.opencontainers.image.version": __version__,
+            "org.opencontainers.image.source": SOURCE,
+            **({} if image in SHARED else {"dodo.service": image}),
+        }
 
 
 INSIDE = """
@@ -140,13 +142,6 @@ def test_the_gantry_s_image_has_an_emulated_rig_that_runs(built: dict[str, str])
     assert run(built["gantry"], "sh", "-c", look).startswith("usage: rig-emulator ")
 
 
-def test_shared_stages_do_not_pass_for_services(built: dict[str, str]) -> None:
-    assert config(built["sandbox"])["Labels"]["dodo.service"] == "sandbox"
-    assert "dodo.service" not in config(built["base"])["Labels"]
-    assert "dodo.service" not in config(built["vision"])["Labels"]
-    assert {config(built[name])["User"] for name in ("base", "geometry", "vision", "sandbox")} == {"10001:10001"}
-
-
 @pytest.mark.parametrize("name", [pytest.param("sandbox", marks=pytest.mark.proof), "virtual-camera"])
 def test_nothing_is_writable_that_need_not_be(built: dict[str, str], name: str) -> None:
     """Looked at as root, who sees every folder; ``/dev`` and ``/proc`` are the engine's."""
@@ -159,31 +154,12 @@ def test_nothing_is_writable_that_need_not_be(built: dict[str, str], name: str) 
     assert run(built[name], *find, "-nouser", flags=as_root) == ""
 
 
-def test_sandbox_can_do_what_the_runner_asks_of_it(built: dict[str, str]) -> None:
-    """It sleeps without a command, and its bash sends datagrams (TestBegin)."""
-    assert config(built["sandbox"])["Cmd"] == ["sleep", "infinity"]
-    assert run(built["sandbox"], "bash", "-c", "printf x > /dev/udp/127.0.0.1/9 && id -u") == "10001"
-
-
 def test_service_gets_healthy_and_ends_when_told_to(built: dict[str, str], volume: str) -> None:
     with started(built["integrator"], volume, "pose", "--cid=131") as container:
         assert await_health(container) == "healthy"
         assert docker("logs", container).splitlines()[0] == '{"dodo": "ready"}'
         docker("stop", "--time", "10", container)
         assert docker("inspect", "--format", "{{.State.ExitCode}}", container) == "0"
-
-
-def test_recorder_can_encode_pictures(built: dict[str, str]) -> None:
-    look = "from dodo_dsl.opendlv import pixels as p; from dodo_dsl.opendlv import video as v; "
-    look += "import numpy; "
-    look += "picture = p.view(numpy.zeros(p.size('i420', 64, 48), numpy.uint8), 'i420', 64, 48); "
-    look += "print(len(v.VideoEncoder('i420', 64, 48, 4).encode(picture)) > 0)"
-    assert run(built["rec-recorder"], "python3", "-c", look) == "True"
-
-
-def test_service_that_is_not_ready_is_not_healthy(built: dict[str, str], volume: str) -> None:
-    with started(built["base"], volume, "pose", "sleep", "60", flags=("--health-retries", "1")) as container:
-        assert await_health(container) == "unhealthy"
 
 
 def test_recorder_writes_into_a_volume_that_docker_makes(built: dict[str, str], volume: str) -> None:

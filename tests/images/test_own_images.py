@@ -54,20 +54,15 @@ def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Repository:
 
 
 def test_it_is_built_on_the_base_of_the_same_prefix_and_tag(repository: Repository) -> None:
-    folder = repository.service("smoothness")
+    """On the stage that the default in its Dockerfile names."""
+    folder = repository.service("smoothness", DOCKERFILE.replace("base", "geometry"))
     code, said = repository.run("build", "smoothness", "--prefix", PREFIX, "--tag", "2")
     assert (code, said.splitlines()[-1]) == (0, f"built {PREFIX}/smoothness:2")
     (words,) = repository.asked("buildx", "build")
     assert words == (
         f"buildx build --load --file {folder}/Dockerfile --tag {PREFIX}/smoothness:2 "
-        f"--build-arg DODO_BASE={PREFIX}/base:2 {repository.root}"
+        f"--build-arg DODO_BASE={PREFIX}/geometry:2 {repository.root}"
     )
-
-
-def test_it_stands_on_the_stage_that_its_default_names(repository: Repository) -> None:
-    repository.service("smoothness", DOCKERFILE.replace("base", "geometry"))
-    assert repository.run("build", "smoothness")[0] == 0
-    assert f"DODO_BASE=dodo/geometry:{__version__} " in repository.asked("buildx", "build")[0]
 
 
 def test_with_all_the_others_it_comes_after_what_it_stands_on(repository: Repository) -> None:
@@ -91,12 +86,6 @@ def test_what_is_missing(repository: Repository) -> None:
     docker.write_text(docker.read_text().replace("image-inspect)", "buildx-build) echo oh; exit 1;; image-inspect)"))
     code, said = repository.run("build", "smoothness")
     assert (code, "my_services/smoothness/Dockerfile cannot be built on dodo/base" in said) == (Exit.ERROR, True)
-
-
-def test_a_manifest_with_a_mistake_is_said(repository: Repository) -> None:
-    (repository.service("smoothness") / "service.yml").write_text("name: smoothness\n")
-    code, said = repository.run("build", "smoothness")
-    assert (code, "problems in my_services/smoothness/service.yml" in said) == (Exit.USAGE, True)
 
 
 def test_it_is_pushed_with_the_others(repository: Repository) -> None:
