@@ -3,9 +3,10 @@
 import asyncio
 import contextlib
 import functools
+import itertools
 import os
 import signal
-from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, Self
 
@@ -44,17 +45,14 @@ def default_backend(plans: Sequence[Plan]) -> BackendName:
 
 @dataclass(frozen=True)
 class Policy:
-    """What to do when a test does not pass: begin no further ones; run it again when it ended in error."""
+    """What to do when a test does not pass: begin no further ones; try it again so often when it ended in error."""
 
     fail_fast: bool = False
     retries: int = 0
 
 
 class Runner:
-    """Runs jobs, as many at once as ``schedule`` allows, in its order. Times are of the event loop's clock, in s.
-
-    Tests for which the machine was too busy run once more behind all that wait, with all cores.
-    """
+    """Runs jobs, as many at once as ``schedule`` allows, in its order."""
 
     def __init__(
         self, progress: Progress, backends: CombinedBackends, schedule: Schedule, policy: Policy, keep: bool = False
@@ -67,11 +65,8 @@ class Runner:
         self.interrupted = False
         self.skipped: list[Job] = []
         self._cores = CorePool(schedule.capacity)
-        self._waiting: list[Job] = []
         self.kept: list[str] = []
         """Sentences on the tests that were left running."""
-        self._made: dict[str, int] = {}
-        """How many attempts at each test there were."""
         self._stop = False
         self._finished: Finished | None = None
 
@@ -91,8 +86,7 @@ class Runner:
         for text in secret_variables.passed_secrets(os.environ, passed):
             self.progress.note(text)
         await self.backends.prepare([job.plan for job in jobs], self.progress.note)
-        self._waiting = self.schedule.ordered(jobs)
-        tasks = {job.plan.slug: asyncio.ensure_future(self._one(job)) for job in self._waiting}
+        tasks = {job.plan.slug: asyncio.ensure_future(self._one(job)) for job in self.schedule.ordered(jobs)}
         with _signals_call(lambda: self._interrupt(tasks)):
             await asyncio.gather(*tasks.values())
         return [outcome for job in jobs if (outcome := tasks[job.plan.slug].result()) is not None]
@@ -105,81 +99,47 @@ class Runner:
                 task.cancel()
 
     async def _one(self, job: Job) -> Outcome | None:
-        """A test's outcome, or None when no further test was to begin."""
+        """A test's outcome, or None when no further test was to begin.
 
-        outcome = await self._turn(job, self.schedule.need(job), functools.partial(self._outcome, job))
+        An error is tried again, alone and behind all that wait: as often as the policy says, and once where the machine
+        was too busy. What was before stays in the report.
+        """
+        notes: tuple[str, ...] = ()
+        outcome, cores = None, self.schedule.need(job)
+        for number in itertools.count(1):
+            latest = await self._turn(job, cores)
+            if latest is None:
+                break
+            outcome = replace(latest, notes=(*notes, *latest.notes))
+            most = max(self.policy.retries, is_undecided(outcome))
+            if outcome.outcome != "error" or number > most or self.interrupted or self.keep:
+                break
+            if problem := _set_aside(job, number):
+                outcome = replace(outcome, notes=(*outcome.notes, f"not tried again, {problem}"))
+                break
+            notes = (*outcome.notes, f"attempt {number} ended in error: {outcome.reason}")
+            self.progress.phase(job.plan.slug, f"waiting to be tried again alone, after error: {outcome.reason}")
+            cores = self.schedule.capacity
         if outcome is None:
             self.skipped.append(job)
             return None
-        if is_undecided(outcome) and not self.interrupted and not self.keep:
-            self.progress.phase(job.plan.slug, "waiting for another attempt alone, because the machine was too busy")
-            self._waiting.append(job)
-            again = functools.partial(self._again, job, outcome)
-            outcome = await self._turn(job, self.schedule.capacity, again) or outcome
         self._stop |= self.policy.fail_fast and outcome.outcome != "passed"
         self.progress.done(outcome)
         if self._finished:
             self._finished(job, outcome)
         return outcome
 
-    async def _turn(self, job: Job, cores: int, attempt: Callable[[], Awaitable[Outcome]]) -> Outcome | None:
+    async def _turn(self, job: Job, cores: int) -> Outcome | None:
         """The outcome of an attempt with some cores, in its turn; None when no further one was to begin."""
         try:
             async with self._cores.take(cores):
-                self._waiting.remove(job)
-                if self._stop or self.interrupted:
-                    return None
-                return await attempt()
+                return None if self._stop or self.interrupted else await self._attempt(job)
         except asyncio.CancelledError:
             return None
-        except Exception as error:  # noqa: BLE001  (one job must not cost the results of the others)
-            return error_outcome(job.plan, self.backends.name, describe(error, job.report))
-
-    async def _again(self, job: Job, first: Outcome) -> Outcome:
-        """The outcome of a test for which the machine was too busy."""
-        if problem := self._set_aside(job):
-            return replace(first, notes=(*first.notes, f"not tried again alone, {problem}"))
-        self.progress.phase(job.plan.slug, "trying again alone")
-        outcome = await self._outcome(job, alone=True)
-        note = f"tried again alone, because the machine was too busy: {first.reason}"
-        return replace(outcome, notes=(*first.notes, note, *outcome.notes))
-
-    async def _outcome(self, job: Job, alone: bool = False) -> Outcome:
-        """That of the last attempt, after errors up to as many as the policy says; earlier ones stay in the report.
-
-        What a busy machine left undecided is tried again when the test is ``alone``, and not at once.
-        """
-        notes: tuple[str, ...] = ()
-        for left in range(self.policy.retries, -1, -1):
-            outcome = await self._attempt(job)
-            is_over = outcome.outcome != "error" or (is_undecided(outcome) and not alone)
-            if is_over or self.interrupted or not left:
-                break
-            notes = (*notes, f"attempt {self._made[job.plan.slug]} ended in error: {outcome.reason}")
-            if problem := self._set_aside(job):
-                notes = (*notes, f"not retried, {problem}")
-                break
-            self.progress.phase(job.plan.slug, f"retrying after error: {outcome.reason}")
-        return replace(outcome, notes=(*notes, *outcome.notes))
-
-    def _set_aside(self, job: Job) -> str:
-        """Moves the report of the last attempt into ``attempts/<number>``; why it cannot be, or an empty text."""
-        target = job.report / "attempts" / str(self._made[job.plan.slug])
-        try:
-            entries = [each for each in job.report.iterdir() if each.name != "attempts"]
-            target.mkdir(parents=True)
-            for entry in entries:
-                entry.rename(target / entry.name)
-        except FileNotFoundError:  # it reported nothing
-            return ""
-        except OSError as error:
-            return f"because its report cannot be moved: {error.filename}: {error.strerror}"
-        return ""
 
     async def _attempt(self, job: Job) -> Outcome:
-        slug, outcome = job.plan.slug, None
-        self._made[slug] = self._made.get(slug, 0) + 1
-        say = functools.partial(self.progress.phase, slug)
+        outcome = None
+        say = functools.partial(self.progress.phase, job.plan.slug)
 
         def forget_pictures() -> None:
             with contextlib.suppress(OSError):
@@ -201,6 +161,21 @@ class Runner:
         if outcome.outcome == "passed" and not self.keep:
             forget_pictures()
         return outcome
+
+
+def _set_aside(job: Job, number: int) -> str:
+    """Moves the report of an attempt into ``attempts/<number>``; why it cannot be, or an empty text."""
+    target = job.report / "attempts" / str(number)
+    try:
+        entries = [each for each in job.report.iterdir() if each.name != "attempts"]
+        target.mkdir(parents=True)
+        for entry in entries:
+            entry.rename(target / entry.name)
+    except FileNotFoundError:  # it reported nothing
+        return ""
+    except OSError as error:
+        return f"because its report cannot be moved: {error.filename}: {error.strerror}"
+    return ""
 
 
 @contextlib.contextmanager

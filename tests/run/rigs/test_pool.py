@@ -118,6 +118,6 @@ def test_the_outcome_names_the_rig() -> None:
     assert held is not None
     quiet = SimpleNamespace(phase=lambda *_: None)
     runner = Runner(cast(Any, quiet), cast(Any, Backends()), Schedule(1), Policy())
-    outcome = run(runner._outcome(pool()))
+    outcome = run(runner._attempt(pool()))
     held.release()
     assert (outcome.outcome, outcome.slug, outcome.notes) == ("passed", "any", ("ran on rig 'kiwi-2'",))
