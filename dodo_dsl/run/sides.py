@@ -206,12 +206,9 @@ class Backend:
         self.name, self.cid, self.is_on_host = name, cid, is_on_host
         self._watched, self._own, self._application = watched, own, application
         self._send: Send | None = None
-        self.tail, self.next_event = watched.tail, watched.events.get
+        self._sides = (own,) if own is application else (own, application)
+        self.tail, self.next_event, self.unmatched = watched.tail, watched.events.get, watched.lines.unmatched
         self.listeners, self.application = application.listeners, application.application
-
-    @property
-    def _both(self) -> list[Side]:
-        return [self._own] if self._own is self._application else [self._own, self._application]
 
     async def open(self) -> None:
         process = await self._application.open()
@@ -238,10 +235,8 @@ class Backend:
 
     async def use(self) -> Snapshot | None:
         """What all have used; the load of the machine is measured if both sides know it."""
-        own, *others = await asyncio.gather(*(side.use() for side in self._both))
-        if not others:
-            return own
-        application = others[0]
+        taken = await asyncio.gather(*(side.use() for side in self._sides))
+        own, application = taken[0], taken[-1]
         if own is None or application is None:
             return application and replace(application, busy_s=None)
         busy_s = None if application.busy_s is None else own.busy_s
@@ -252,15 +247,9 @@ class Backend:
             turn.cancel()
         await asyncio.gather(*self._watched.turns, return_exceptions=True)
         try:
-            kept = await asyncio.gather(*(side.close(keep) for side in self._both), return_exceptions=True)
+            kept = await asyncio.gather(*(side.close(keep) for side in self._sides), return_exceptions=True)
         finally:
             self._watched.close()
-        lines: list[str] = []
-        for each in kept:
-            if isinstance(each, BaseException):
-                raise each
-            lines += each
-        return lines
-
-    def unmatched(self) -> list[str]:
-        return self._watched.lines.unmatched()
+        if errors := [each for each in kept if isinstance(each, BaseException)]:
+            raise errors[0]
+        return [line for each in kept if isinstance(each, list) for line in each]

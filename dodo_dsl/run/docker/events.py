@@ -12,11 +12,10 @@ from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
 class EventWatch:
     """Calls ``on_event`` with a service's name, action and attributes, and ``on_lost`` with the reason at the end.
 
-    Both are called in the event loop of the creator, and not after ``ignores`` was set.
+    Both are called in the event loop of the creator.
     """
 
     def __init__(self, on_event: Callable[[str, str, Mapping[str, str]], None], on_lost: Callable[[str], None]) -> None:
-        self.ignores = False
         self._on_event = on_event
         self._on_lost = on_lost
         self._loop = asyncio.get_running_loop()
@@ -40,17 +39,15 @@ class EventWatch:
             why = f"the Docker engine went away: {error}"
         else:
             why = "the Docker engine went away: its events ended"
-        if not self.ignores:
-            self.call_in_loop(self._on_lost, why)
+        self.call_in_loop(self._on_lost, why)
 
     def _take(self, event: Mapping[str, Any]) -> None:
         attributes = event.get("Actor", {}).get("Attributes", {})
         name, action = attributes.get(SERVICE_LABEL, ""), str(event.get("Action", ""))
-        if name and not self.ignores:
+        if name:
             self._on_event(name, action, attributes)
 
     def close(self) -> None:
-        self.ignores = True
         if self._events is not None:
             with contextlib.suppress(Exception):
                 self._events.close()
