@@ -1,6 +1,7 @@
 """One test from set-up to outcome, whatever backend it runs on."""
 
 import asyncio
+import contextlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -49,7 +50,6 @@ class Engine:
     _now: Callable[[], float] = field(init=False)
     _meter: Meter = field(init=False)
     _begin_sent: float = 0.0
-    _is_measured: bool = False
 
     async def run(self, keep: bool = False) -> tuple[Outcome, list[str]]:
         """The outcome, and sentences about a test that is kept up. Cancelling gives the outcome error, too."""
@@ -61,7 +61,6 @@ class Engine:
             await self._set_up()
             self._meter.begin()
             await self._execute()
-            await self._measure()
         except Ended:
             pass
         except BackendError as error:
@@ -73,24 +72,15 @@ class Engine:
             if self.state.finished is None:
                 self.state.finished = self._now()
             self.state.keep_tails(self.backend)
-            if self.state.finding.silent and not self.backend.is_on_host:
-                await self._look_for_buses()
-            if not keep and self.state.outcome(self.backend).outcome == "passed":
-                self.passed()
-            self.say("taking down")
             kept = await self._close(keep)
             await self._collect_losses()
         return self.state.outcome(self.backend), kept
 
     async def _look_for_buses(self) -> None:
         """Reports to the state on which buses an application is of which nothing came."""
-        try:
+        with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(EXPLAIN_PATIENCE_S):
                 self.state.buses = frozenset(listeners.buses(await self.backend.application() or ()))
-        except TimeoutError:
-            pass
-        except asyncio.CancelledError:
-            asyncio.current_task().uncancel()  # type: ignore[union-attr]
 
     async def _close(self, keep: bool) -> list[str]:
         """Teardown to its end, however often the run is interrupted meanwhile; its errors do not change the verdict."""
@@ -106,9 +96,7 @@ class Engine:
         return []
 
     async def _measure(self) -> None:
-        """Takes the last figures of load and use, while the application is there, if they are not taken yet."""
-        if self._is_measured:
-            return
+        """Takes the last figures of load and use, while the application is there."""
         try:
             await self._meter.end()
         except Exception as error:  # noqa: BLE001  (whatever it is, it must not decide the test)
@@ -117,10 +105,14 @@ class Engine:
         names = [service.name for service in self.plan.application.services]
         self.state.resources = self._meter.figures(names)
         self.state.load = self._meter.load()
-        self._is_measured = True
 
     async def _wind_up(self, keep: bool) -> list[str]:
         await self._measure()
+        if self.state.finding.silent and not self.backend.is_on_host:
+            await self._look_for_buses()
+        if not keep and self.state.outcome(self.backend).outcome == "passed":
+            self.passed()
+        self.say("taking down")
         return await self.backend.close(keep)
 
     async def _collect_losses(self) -> None:
