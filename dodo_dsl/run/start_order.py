@@ -10,7 +10,7 @@ from dodo_dsl.run.outcomes import how_it_ended
 LONGEST_S = 600.0
 """The longest that a service waits for a condition to come true, in s, once the other one has started."""
 _ASKED = {STARTED: "start", HEALTHY: "be healthy", COMPLETED: "end with exit code 0"}
-UNHEALTHY = "is unhealthy"
+UNHEALTHY, LATE = "is unhealthy", f"did not within {LONGEST_S:g} s"
 
 
 class Conditions:
@@ -44,28 +44,24 @@ class Conditions:
         ``note`` gets a sentence for each optional service without which it starts.
         """
         for other, asked in self.of(name).items():
-            why = await asyncio.shield(self._known[other, STARTED])
-            try:
-                async with asyncio.timeout(LONGEST_S):
-                    why = why or await asyncio.shield(self._known[other, asked])
-                why = why and f"which {why}"
-            except TimeoutError:
-                why = f"and it did not within {LONGEST_S:g} s"
+            why = await self._known_of(other, STARTED) or await self.why_not(other, asked)
+            told = f"it waits for '{other}' to {_ASKED[asked]} (depends_on), which {why}"
             if why and other not in self._optional[name]:
-                return f"it waits for '{other}' to {_ASKED[asked]} (depends_on), {why}"
+                return told
             if why:
-                key = "depends_on, required: false"
-                note(f"service '{name}' starts all the same: it waits for '{other}' to {_ASKED[asked]} ({key}), {why}")
+                note(f"service '{name}' starts all the same (required: false): {told}")
         return ""
 
-    async def ill(self, name: str) -> str:
-        """Waits until a service that has started is healthy, or has ended; why it is neither, else empty."""
+    async def why_not(self, name: str, condition: str) -> str:
+        """Waits until a condition has come true; why it will not, else empty."""
         try:
             async with asyncio.timeout(LONGEST_S):
-                why = await asyncio.shield(self._known[name, HEALTHY])
+                return await self._known_of(name, condition)
         except TimeoutError:
-            return f"its healthcheck did not succeed within {LONGEST_S:g} s"
-        return "its healthcheck failed" if why == UNHEALTHY else ""
+            return LATE
+
+    def _known_of(self, name: str, condition: str) -> "asyncio.Future[str]":
+        return asyncio.shield(self._known[name, condition])  # as who waits may give up
 
 
 def one_off(services: Iterable[ApplicationService]) -> set[str]:

@@ -31,14 +31,12 @@ from dodo_dsl.run.outcomes import unstartable
 from dodo_dsl.run.printed_lines import Send
 from dodo_dsl.run.protocol import BackendError, Exited, Ready
 from dodo_dsl.run.sides import APPLICATION, WatchedServices
-from dodo_dsl.run.start_order import UNHEALTHY
+from dodo_dsl.run.start_order import LATE, UNHEALTHY
 
 _KILLED = 128 + signal.SIGKILL
 """The exit code of a container whose program was killed by a signal that it cannot refuse."""
 _MEMORY_S = 1.0
 """How long the engine's word is awaited that it was for memory: it may come late."""
-_COPY_S = 600.0
-"""The longest that copies of the repository's files may take."""
 _OUTPUT_S = 2.0
 _TOO_SLOW = re.compile("failed to create shim.*context deadline exceeded")
 """In the error of an engine that was too busy to start a container; it may try again."""
@@ -64,8 +62,6 @@ class ContainerSide:
         self._is_closing = False
         self._kills: set[asyncio.Future[None]] = set()
         self._events = EventWatch(self._take, watched.lose)
-        self._copied = asyncio.get_running_loop().create_future()
-        """Whether the application has its own copies of the repository's files."""
         self.left_behind = False
 
     @property
@@ -147,9 +143,6 @@ class ContainerSide:
                 self._watched.tell(Exited(name, code))
         elif action == "oom":
             self._take_memory_kill(name)
-        elif name == FILES:
-            if action in ("health_status: healthy", "die") and not self._copied.done():
-                self._copied.set_result(action != "die")
         elif action == "health_status: healthy":
             self._watched.conditions.decide(name, HEALTHY)
             self._watched.tell(Ready(name))
@@ -158,6 +151,8 @@ class ContainerSide:
         elif action == "die" and name in self._watched.outputs:
             task = asyncio.ensure_future(self._died(name, int(attributes.get("exitCode", 1))))
             task.add_done_callback(lambda t: t.exception())
+        elif action == "die" and name == FILES:
+            self._watched.conditions.ended(name, int(attributes.get("exitCode", 1)))
         elif action == "die" and name == SANDBOX and attributes.get("exitCode") == str(PAGE_DESTROYED):
             pass  # the clock says it
         elif action == "die":
@@ -177,13 +172,10 @@ class ContainerSide:
         """Until the application has its own copies of the repository's files; raises BackendError."""
         if FILES not in self._containers:
             return
-        await asyncio.wait([self._copied], timeout=_COPY_S)
-        if not self._copied.done():
-            hint = "mount large folders read-only (:ro)"
-            raise BackendError(f"the application's files are not copied within {_COPY_S:g} s; {hint}")
-        if not self._copied.result():
-            said = await asyncio.to_thread(_last_line, self._containers[FILES])
-            raise BackendError(f"the application's files cannot be copied: {said or 'the program that does it ended'}")
+        if why := await self._watched.conditions.why_not(FILES, HEALTHY):
+            said = await asyncio.to_thread(_last_line, self._containers[FILES]) or f"the program that does it {why}"
+            hint = "; mount large folders read-only (:ro)" if why == LATE else ""
+            raise BackendError(f"the application's files cannot be copied: {said}{hint}")
         await asyncio.to_thread(self._kill, FILES)
 
     async def _died(self, name: str, code: int) -> None:
@@ -240,9 +232,9 @@ class ContainerSide:
         if not self._compose.has_healthcheck(name):
             self._watched.tell(Ready(name))
             return
-        why = await self._watched.conditions.ill(name)
-        if why and name not in self._watched.may_be_ill:
-            self._watched.tell(unstartable(self._plan, name, why))
+        why = await self._watched.conditions.why_not(name, HEALTHY)
+        if why in (UNHEALTHY, LATE) and name not in self._watched.may_be_ill:  # else it has ended
+            self._watched.tell(unstartable(self._plan, name, f"its healthcheck failed: it {why}"))
 
     def _start_container(self, name: str, again: bool = False) -> Any:
         """Starts a container, if need be twice; what it prints."""

@@ -72,10 +72,10 @@ def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] 
     return asyncio.run(asyncio.wait_for(started(), 20.0))
 
 
-@pytest.mark.parametrize(
-    ("status", "last"),
-    [("healthy", [Ready("app")]), ("unhealthy", [unstartable(plan(), "app", "its healthcheck failed")])],
-)
+ILL = unstartable(plan(), "app", "its healthcheck failed: it is unhealthy")
+
+
+@pytest.mark.parametrize(("status", "last"), [("healthy", [Ready("app")]), ("unhealthy", [ILL])])
 def test_one_that_waits_for_others_has_its_own_health_awaited(status: str, last: list[Event], tmp_path: Path) -> None:
     waits, events = in_turn(tmp_path, ("db", "healthy"), ("app", status))
     assert (waits, events) == ({"app": True, "db": True}, [Ready("db"), *last])
