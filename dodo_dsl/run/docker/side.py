@@ -5,7 +5,7 @@ import contextlib
 import re
 import signal
 import threading
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,6 @@ from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down
 from dodo_dsl.run.docker.client import engine_error, refusal
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ContainerUse
-from dodo_dsl.run.docker.events import EventWatch
 from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, close, copy_into, type_into
 from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.machine_load.service_use import Snapshot
@@ -61,15 +60,12 @@ class ContainerSide:
         self._out_of_memory: set[str] = set()
         self._is_closing = False
         self._kills: set[asyncio.Future[None]] = set()
-        self._events = EventWatch(self._take, watched.lose)
+        self._loop = asyncio.get_running_loop()
+        self._events: Any = None
         self.left_behind = False
 
-    @property
-    def _is_on_host(self) -> bool:
-        return self._plan.isolation == "host"
-
     async def open(self, entered: int = 0) -> int:
-        if self._plan.lockstep and self._is_on_host:
+        if self._plan.lockstep and self._plan.isolation == "host":
             self._watched.await_answers("containers on the host's network cannot have the test's time")
         await asyncio.to_thread(self._compose.read)
         await self._pulls.once("docker compose", self._compose.require_plugin)
@@ -119,7 +115,8 @@ class ContainerSide:
             self._containers = {container.labels[SERVICE_LABEL]: container for container in found}
             self._use = ContainerUse(self._containers, self._application)
             self._require_health()
-            await asyncio.to_thread(self._events.begin, self._client, self._compose.project)
+            self._events = await asyncio.to_thread(self._client.events, decode=True, filters=label)
+            threading.Thread(target=self._read_events, daemon=True).start()
             for name in (SANDBOX, FILES):
                 if name in self._containers:
                     close(await asyncio.to_thread(self._start_container, name))
@@ -135,6 +132,21 @@ class ContainerSide:
                         f"service '{service.name}' waits for '{other}' to be healthy (depends_on), but neither the "
                         f"compose file nor the image of '{other}' has a healthcheck"
                     )
+
+    def _read_events(self) -> None:
+        try:
+            for event in self._events:
+                attributes = event.get("Actor", {}).get("Attributes", {})
+                if name := attributes.get(SERVICE_LABEL):
+                    self._call(self._take, name, str(event.get("Action", "")), attributes)
+            self._call(self._watched.lose, "the Docker engine went away: its events ended")
+        except Exception as error:  # noqa: BLE001  (whatever ended the stream, there are no more events)
+            self._call(self._watched.lose, f"the Docker engine went away: {error}")
+
+    def _call(self, work: Callable[..., object], *arguments: Any) -> None:
+        """Calls a function in the event loop, from any thread."""
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(work, *arguments)
 
     def _take(self, name: str, action: str, attributes: Mapping[str, str]) -> None:
         if self._is_closing:
@@ -265,7 +277,9 @@ class ContainerSide:
             kept = self._kept()
         else:
             await asyncio.to_thread(self._take_down)
-        self._events.close()
+        if self._events is not None:
+            with contextlib.suppress(Exception):
+                self._events.close()
         if self._relay is not None:
             self._relay.close()
         return kept
@@ -279,7 +293,7 @@ class ContainerSide:
     def _note(self, text: str) -> None:
         """Reports a sentence at once, and with the outcome; may be called from any thread."""
         self._compose.say(text)
-        self._events.call_in_loop(self._watched.note, text)
+        self._call(self._watched.note, text)
 
     def _kept(self) -> list[str]:
         compose = f"docker compose -p {self._compose.project}"
