@@ -18,7 +18,6 @@ from dodo_dsl.run.engine import (
     READY_PATIENCE_S,
     Engine,
 )
-from dodo_dsl.run.machine_load.judgement import UNSEEN_USE
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
 from dodo_dsl.run.protocol import (
     BackendError,
@@ -96,13 +95,6 @@ def test_a_failure_on_a_busy_machine_is_an_error_and_a_pass_stays_one() -> None:
         assert (found.machine.duration_s, found.machine.undecided) == (5.0, found is failed)
 
 
-def test_a_busy_machine_excuses_no_crash() -> None:
-    found = on(BUSY, (2.0, FAILED), (2.0, Exited("app", 3)))
-    assert found.outcome == "error", "the verdict was there before"
-    found = on(BUSY, (2.0, Exited("app", 3)))
-    assert (found.outcome, found.machine is not None and found.machine.undecided) == ("failed", False)
-
-
 def test_pictures_that_come_late() -> None:
     """Those of the camera, and the updates of others; rarely is no harm."""
     flags = (Flag("name.argb", "video0.argb", "memory"),)
@@ -115,10 +107,6 @@ def test_pictures_that_come_late() -> None:
     assert late.outcome == "error"
     assert late.machine is not None
     assert (late.machine.late_pictures_share, late.machine.late_updates_share, late.machine.lateness_s) == (0.5, 0, 0.3)
-    other = on(calm, (4.0, Late("track", 40, 20, 0.3)), (4.5, Late("camera", 40, 1, 0.4)), *ending, tested=seeing)
-    assert "50 % of the updates of one of DoDo's services came late, by up to 0.40 s" in other.reason
-    rarely = on(calm, (4.0, Late("track", 40, 4, 0.3)), *ending, tested=seeing)
-    assert (rarely.outcome, rarely.machine and rarely.machine.lateness_s) == ("failed", 0.3)
 
 
 def test_an_emulated_rig_that_stood_still() -> None:
@@ -168,16 +156,6 @@ def test_limits_of_what_the_application_uses_are_judged_before_it_has_passed() -
     assert (found.outcome, told) == ("failed", [])
     assert found.reason == "application service 'app' used 500 MB of memory, at most 200 MB"
     assert [(check["name"], check["ok"]) for check in found.checks] == [("peak-memory-app", False)]
-
-
-def test_use_that_cannot_be_measured_costs_no_verdict() -> None:
-    def broken(now: float) -> None:
-        raise OSError("gone")
-
-    found = outcome(using(broken, resources=ResourceLimits(max_memory_mb=200.0)))
-    assert (found.outcome, found.resources) == ("passed", ())
-    assert found.notes == (UNSEEN_USE, "load and use of the machine were not measured to the end: OSError: gone")[::-1]
-    assert outcome(using(lambda _: None)).notes == ()
 
 
 EARLY = "after 2.0 s, before the test was decided"
@@ -302,25 +280,6 @@ def test_a_backend_that_does_not_open_is_closed(problem: Exception) -> None:
         with pytest.raises(type(problem)):
             outcome(backend)
     assert backend.calls[-1] == "close"
-
-
-def test_several_evaluators_end_and_the_worst_verdict_counts() -> None:
-    tested = plan(evaluators=("track", "signal", "objects"))
-    stages: dict[str, Events] = {
-        "environment": READY["environment"],
-        "evaluation": [(1.0, Ready(name)) for name in ("track", "signal", "objects")],
-        "begin": [
-            (1.0, PASSED),
-            (1.0, ENDED),
-            (2.0, VerdictEvent("signal", False, "far off", ({"name": "mean"},))),
-            (2.0, Exited("signal", 0)),
-            (3.0, VerdictEvent("objects", True, "found all", ({"name": "recall"},))),
-            (3.0, Exited("objects", 0)),
-        ],
-    }
-    found = outcome(ScriptedBackend(tested, stages, tails={"signal": ["it is far", "off"]}))
-    assert (found.outcome, found.reason, found.last_lines) == ("failed", "far off", ("it is far", "off"))
-    assert ([check["name"] for check in found.checks], found.execution_s) == (["mean", "recall"], 3.0)
 
 
 def test_what_the_application_must_not_send_fails_the_test_whenever_it_is_read() -> None:
@@ -502,16 +461,6 @@ def test_in_lockstep_it_begins_when_the_application_rests() -> None:
     backend.plan, backend.by_answers = replace(backend.plan, lockstep=Lockstep(1, 60.0)), False
     found = outcome(backend)
     assert (found.outcome, found.notes, found.setup_s) == ("passed", (), pytest.approx(8.0))
-
-
-def test_what_is_written_after_the_decision_is_not_quoted() -> None:
-    class Talking(ScriptedBackend):
-        async def close(self, keep: bool) -> list[str]:
-            self.tails = {"track": ["it hit the wall", "ended by SIGTERM"]}
-            return await super().close(keep)
-
-    stages = {**READY, "begin": [(1.0, FAILED), (1.0, ENDED)]}
-    assert outcome(Talking(plan(), stages, tails={"track": ["it hit the wall"]})).last_lines == ("it hit the wall",)
 
 
 @pytest.mark.parametrize(

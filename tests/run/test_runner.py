@@ -21,7 +21,6 @@ from tests.run.scripted import (
     FAILED,
     PASSED,
     READY,
-    Events,
     ScriptedBackend,
     ScriptedBackends,
     drives,
@@ -114,6 +113,7 @@ def logged(scene: Scene) -> Scene:
 def test_an_error_is_retried_and_both_attempts_are_kept(logged: Scene) -> None:
     logged.policy = Policy(retries=2)
     (outcome,) = logged.run(plan("a"))
+    assert logged.backends.began == ["a", "a"], "a failure is none"
     assert (outcome.outcome, outcome.reason) == ("failed", "hit wall left")
     assert outcome.notes == (f"attempt 1 ended in error: {CRASHED}",)
     report = logged.folder / "report" / "a"
@@ -185,18 +185,6 @@ def test_a_machine_that_stays_too_busy_is_an_error(scene: Scene, retries: int) -
     assert endings([a, b]) == [("a", "error", TOO_BUSY), ("b", "error", TOO_BUSY)]
     assert scene.backends.began == list("ab" * (1 + max(1, retries)))
     assert len(a.notes) == max(1, retries)
-
-
-@pytest.mark.parametrize(
-    ("retries", "stages", "expected", "attempts"),
-    [(0, CRASH, "error", 1), (2, CRASH, "error", 3), (2, drives(1.0, FAILED), "failed", 1)],
-)
-def test_errors_alone_are_retried(
-    scene: Scene, retries: int, stages: dict[str, Events], expected: str, attempts: int
-) -> None:
-    scene.policy, scene.backends.make = Policy(retries=retries), by_slug(a=stages)
-    (outcome,) = scene.run(plan("a"))
-    assert (outcome.outcome, len(outcome.notes), scene.backends.began) == (expected, attempts - 1, ["a"] * attempts)
 
 
 @pytest.mark.parametrize(

@@ -110,38 +110,22 @@ def test_lines_for_a_terminal_are_the_messages_of_plain_ones(desk: Desk) -> None
         assert desk.print(bar + coloured) == plain
 
 
-def test_one_line_may_be_several_messages(tmp_path: Path) -> None:
-    pedal = Line("p=(?P<position>[-.0-9]+)", "opendlv.proxy.PedalPositionRequest", 1)
-    desk = Desk(tmp_path, Line("s=(?P<groundSteering>[-.0-9]+)", STEERING), pedal)
-    assert [found for _, _, found in desk.print(b"s=0.5 p=0.125")] == [{"groundSteering": 0.5}, {"position": 0.125}]
-
-
 @pytest.mark.parametrize(
     ("type_", "text", "expected"),
     [
         ("float", b"-.5e1", -5.0),
         ("float", b"1e39", "not a valid float"),
-        ("double", b"1e39", 1e39),
         ("double", b"1e999", "not a valid double"),
         ("double", b"inf", math.inf),
-        ("double", b"0,5", "not a valid double"),
         ("double", b"1_0", "not a valid double"),
         ("double", "\N{ARABIC-INDIC DIGIT ONE}".encode(), "not a valid double"),
-        ("double", b"", "not a valid double"),
-        ("uint8", b"255", 255),
         ("uint8", b"256", "not a valid uint8"),
         ("int8", b"-129", "not a valid int8"),
-        ("int64", b"nan", "not a valid int64"),
         ("uint64", b"18446744073709551616", "not a valid uint64"),
-        ("uint64", b"9" * 21, "not a valid uint64"),
         ("bool", b"TRUE", True),
-        ("bool", b"0", False),
         ("bool", b"yes", "not a valid bool"),
-        ("char", b"x", 120),
         ("char", b"xy", "not a valid char"),
-        ("string", "für".encode(), "für"),
         ("string", b"\xff", "not a valid string"),
-        ("bytes", b"\xff\x00", b"\xff\x00"),
     ],
 )
 def test_values_of_fields(type_: str, text: bytes, expected: object) -> None:
@@ -155,12 +139,10 @@ def test_values_of_fields(type_: str, text: bytes, expected: object) -> None:
 @pytest.mark.parametrize(
     ("unit", "text", "expected"),
     [
-        ("us", b"1700000000100000", 1700000000100000),
         ("us", b"1700000000100000.5", "no whole number (of us, without sample-time: s)"),
         ("ms", b"1700000000100.0009", 1700000000100001),
         ("s", b"1700000000.100000", 1700000000100000),
         ("s", b"1700000000.099999905", 1700000000100000),
-        ("s", b"1700000000", 1700000000000000),
         ("s", b"1.7e9", "no number"),
         ("s", b"1700000000100000", "not a time in s"),
     ],
