@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn
@@ -27,19 +27,8 @@ _KILL_TRIES, _KILL_S = 100, 0.01
 _DESCRIPTORS = 65_536
 
 
-def _forked(command: Command, output: int) -> int:
-    """The process id of a child of this process, which has one thread, in a separate session.
-
-    The command is ``python -m MODULE`` with arguments; raises OSError when its folder cannot be entered.
-    """
-    Path(command.folder).stat()
-    sys.stderr.flush()
-    if (pid := os.fork()) == 0:
-        _become(command, output)
-    return pid
-
-
 def _become(command: Command, output: int) -> NoReturn:
+    """What a fork does whose command is ``python -m MODULE`` with arguments."""
     code = 1
     try:
         _set_up(command, output)
@@ -81,24 +70,24 @@ def _set_up(command: Command, output: int) -> None:
 class _Child:
     name: str
     process: subprocess.Popen[bytes] | None = None
-    status: int = -1
-    """What bubblewrap says of an application's program; -1 for others."""
     memory: int = 0
-    """Bytes that it may use at most, 0 for no limit."""
+    """Bytes that an application's program may use at most; 0 of DoDo's, which no sandbox confines."""
+    status: int = -1
+    """What bubblewrap says of it."""
     group: ProcessGroup | None = None
     used: int = 0
     """Bytes for which it was ended."""
 
 
 class Children:
-    """Children of this process; ``on_exit`` is called for each that ended.
+    """Children of this process, which has one thread; ``on_exit`` is called for each that ended.
 
     It gets the name, the exit code, below 0 for a signal, the bytes of memory where those were more than allowed, and
     whether it never began, because its sandbox could not be set up.
     """
 
-    def __init__(self, on_exit: Callable[[str, int, int, bool], None], umask: int = -1) -> None:
-        """``umask`` is that of programs that are started, by default this process's."""
+    def __init__(self, on_exit: Callable[[str, int, int, bool], None], umask: int) -> None:
+        """``umask`` is that of programs that are started, -1 for this process's."""
         self._on_exit = on_exit
         self._umask = umask
         self._running: dict[int, _Child] = {}
@@ -109,41 +98,42 @@ class Children:
         self._took_s: dict[str, float] = {}
         """Processor time of the application's programs that ended, by their groups."""
 
-    def start(self, command: Command, output: int, places: Places | None, may_fork: bool) -> int:
-        """Starts a process and gives its id; a module of DoDo's is forked where it ``may_fork``.
+    def start(self, command: Command, output: int, places: Places | None, may_fork: bool) -> None:
+        """Starts a process; a module of DoDo's is forked where it ``may_fork``.
 
         Raises OSError, SubprocessError, ValueError and NoSeccomp.
         """
+        child = _Child(command.name)
         if command.confined:
+            child.memory = command.confined.limits.memory
             started = confined_process.start(command, command.confined, output, places, self._umask)
-            self.application[started.process.pid] = command.name
-            return self._add(started.process.pid, _Child(command.name, *started))
-        if may_fork and command.is_module and not command.masked:
-            return self._add(_forked(command, output), _Child(command.name))
-        process = subprocess.Popen(
-            command.argv,
-            env=command.environment,
-            cwd=command.folder,
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=output,
-            start_new_session=True,
-            umask=self._umask,
-            preexec_fn=functools.partial(_begin, os.getpid(), command.masked),  # noqa: PLW1509  (it has one thread)
-        )
-        return self._add(process.pid, _Child(command.name, process))
-
-    def _add(self, pid: int, child: _Child) -> int:
+            child.process, child.status, child.group = started
+            pid = child.process.pid
+            self.application[pid] = command.name
+        elif may_fork and command.is_module and not command.masked:
+            Path(command.folder).stat()
+            sys.stderr.flush()
+            if (pid := os.fork()) == 0:
+                _become(command, output)
+        else:
+            child.process = subprocess.Popen(
+                command.argv,
+                env=command.environment,
+                cwd=command.folder,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                start_new_session=True,
+                umask=self._umask,
+                preexec_fn=functools.partial(namespaces.begin, os.getpid(), command.masked),  # noqa: PLW1509
+            )
+            pid = child.process.pid
         self._running[pid] = child
         self.names[pid] = child.name
-        return pid
 
     def with_counted(self, taken: Snapshot) -> Snapshot:
         """What services used, with processes that ended before they were seen, where control groups count them."""
-        took_s = dict(self._took_s)
-        for child in self._running.values():
-            if child.group:
-                took_s[child.name] = child.group.used_s() or 0.0
+        took_s = self._took_s | {child.name: child.group.used_s() for child in self._running.values() if child.group}
         services = {
             name: used._replace(processor_s=max(used.processor_s, took_s.get(name, 0.0)))
             for name, used in taken.services.items()
@@ -167,7 +157,7 @@ class Children:
                     if child.process:
                         child.process.returncode = code  # so that nobody waits for it again
                     if child.group:
-                        self._took_s[child.name] = child.group.used_s() or 0.0
+                        self._took_s[child.name] = child.group.used_s()
                         child.group.remove()
                     if child.status >= 0:
                         code, failed = confined_process.ended(child.status, code)
@@ -180,41 +170,27 @@ class Children:
         ``wait`` returns after some seconds, or sooner when a child has ended.
         """
         for child in reversed(self._running):  # the application first: without a world it would fail
-            for pid in _within(child) if child in self.application else (-child,):
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(pid, signal.SIGTERM)
+            _signal(_within(child) if child in self.application else [-child], signal.SIGTERM)
         deadline = time.monotonic() + GRACE_S
         while self._running and time.monotonic() < deadline:
             wait(_POLL_S)
             self.reap()
         for _ in range(_KILL_TRIES):
-            left = list(_descendants(owns_namespace))
-            if not left:
+            known = living()
+            if not (left := (known if owns_namespace else owners({os.getpid(): ""}, known)).keys() - {os.getpid()}):
                 return
-            for pid in left:
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(pid, signal.SIGKILL)
+            _signal(left, signal.SIGKILL)
             time.sleep(_KILL_S)
             self.reap()
 
 
-def _begin(parent: int, masked: Sequence[str]) -> None:
-    """Between fork and exec."""
-    namespaces.mask(masked)
-    namespaces.end_with(parent)
+def _signal(pids: Iterable[int], number: signal.Signals) -> None:
+    for pid in pids:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, number)
 
 
-def _within(bubblewrap: int) -> Iterator[int]:
+def _within(bubblewrap: int) -> list[int]:
     """The processes in a sandbox, without bubblewrap's own two: its first process, and the one that it watches."""
     known = living()
-    for pid in known:
-        line = [pid]
-        while line[-1] in known and line[-1] != bubblewrap:
-            line.append(known[line[-1]].parent)
-        if line[-1] == bubblewrap and len(line) > 2:
-            yield pid
-
-
-def _descendants(owns_namespace: bool) -> Iterator[int]:
-    known = living()
-    yield from (pid for pid in (known if owns_namespace else owners({os.getpid(): ""}, known)) if pid != os.getpid())
+    return [pid for pid in owners({bubblewrap: "-"}, known) if bubblewrap not in (pid, known[pid].parent)]

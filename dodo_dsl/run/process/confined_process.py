@@ -9,7 +9,6 @@ import shutil
 import subprocess
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 from dodo_dsl.run.process import confinement, namespaces, process_group, seccomp_filter
 from dodo_dsl.run.process.confinement import PROGRAM, Command, Confinement
@@ -23,17 +22,13 @@ _BEGAN = b'"exit-code"'
 """What bubblewrap reports only of a program that it could start (``--json-status-fd``)."""
 
 
-class Started(NamedTuple):
-    """Bubblewrap's process, which ends with the program and gives its exit code, and a descriptor for ``ended``."""
+def start(
+    command: Command, confined: Confinement, output: int, places: Places | None, umask: int
+) -> tuple[subprocess.Popen[bytes], int, ProcessGroup | None]:
+    """Bubblewrap's process, which ends with the program and gives its exit code, and a descriptor for ``ended``.
 
-    process: subprocess.Popen[bytes]
-    status: int
-    memory: int
-    group: ProcessGroup | None
-
-
-def start(command: Command, confined: Confinement, output: int, places: Places | None, umask: int) -> Started:
-    """``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp."""
+    ``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp.
+    """
     program = _found(command.argv[0], command.environment, confined.folder)
     user = places.user if places else None
     given = {**command.environment, **({"HOME": confinement.HOME} if places else {})}
@@ -69,7 +64,7 @@ def start(command: Command, confined: Confinement, output: int, places: Places |
         if group:
             group.remove()
         raise
-    return Started(process, said, confined.limits.memory, group)
+    return process, said, group
 
 
 def ended(said: int, code: int) -> tuple[int, bool]:
@@ -102,7 +97,7 @@ def _found(name: str, environment: Mapping[str, str], folder: str) -> str:
 
 def _limit(limits: SandboxLimits, parent: int, group: ProcessGroup | None, others: int) -> None:
     """Between fork and exec. Without a group the kernel counts processes by user, ``others`` of this one among them."""
-    namespaces.end_with(parent)
+    namespaces.begin(parent)
     if group is None or not group.join():
         _set_limit(resource.RLIMIT_NPROC, limits.processes + process_group.OURS + 2 * others)
     for kind, most in (

@@ -53,8 +53,16 @@ def die_with_parent(signal_number: int) -> None:
     _call("prctl", _PR_SET_PDEATHSIG, signal_number, 0, 0, 0)
 
 
-def end_with(parent: int) -> None:
-    """Between fork and exec of a child: it gets SIGTERM when its parent dies, and ends at once if that has happened."""
+def begin(parent: int, masked: Sequence[str] = ()) -> None:
+    """Between fork and exec of a child: it gets SIGTERM when its parent dies, and ends at once if that has happened.
+
+    It sees /dev/null in the place of ``masked`` device files; raises OSError.
+    """
+    if masked:
+        _unshare(_CLONE_NEWNS)
+        _call("mount", b"none", b"/", None, _MS_REC | _MS_SLAVE, None)
+    for device in masked:
+        bind(Path("/dev/null"), Path(device), deep=False)
     die_with_parent(signal.SIGTERM)
     if os.getppid() != parent:
         os._exit(128 + signal.SIGTERM)
@@ -65,23 +73,9 @@ def adopt_orphans() -> None:
     _call("prctl", _PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
-def mask(devices: Sequence[str]) -> None:
-    """This process, and what it starts, sees /dev/null in the place of device files; raises OSError."""
-    if not devices:
-        return
-    _unshare(_CLONE_NEWNS)
-    _call("mount", b"none", b"/", None, _MS_REC | _MS_SLAVE, None)
-    for device in devices:
-        bind(Path("/dev/null"), Path(device), deep=False)
-
-
 def unshare() -> None:
     """Leaves the host's namespaces; the next fork is process 1 in them. Raises OSError where the kernel refuses."""
     _unshare(_CLONE_NEWNET | _CLONE_NEWIPC | _CLONE_NEWNS | _CLONE_NEWPID)
-
-
-def _keep_mounts_private() -> None:
-    _call("mount", b"none", b"/", None, _MS_REC | _MS_PRIVATE, None)
 
 
 def _unshare(flags: int) -> None:
@@ -120,7 +114,7 @@ def furnish(shown: Collection[Path], trees: Mapping[Path, int]) -> None:
     With the ``trees`` of ``enter``, mounts are all. Of the folders in ``SHARED`` those stay that are ``shown``, which
     are empty to the other process, but no files: they may be another test's tokens.
     """
-    _keep_mounts_private()
+    _call("mount", b"none", b"/", None, _MS_REC | _MS_PRIVATE, None)
     _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
     for folder in filter(Path.is_dir, SHARED):
         old = os.open(folder, os.O_PATH | os.O_DIRECTORY)

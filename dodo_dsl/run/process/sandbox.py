@@ -9,7 +9,7 @@ killed, the kernel sends SIGTERM to what it started. It has one thread: that sig
                         {"do": "relay", "cid", "folder"}; {"do": "send", "to": [name, ...], "data"};
                         {"do": "use", "names": services of which memory is measured, too};
                         {"do": "keep"}: stay when the runner ends
-    sandbox to runner   {"up": pid} or {"down": why}; {"started": id, "pid"} or
+    sandbox to runner   {"up": pid} or {"down": why}; {"started": id} or
                         {"unstartable": id, "why"}; {"exited": id, "code", "used", "failed"};
                         {"relay": whether it can send};
                         {"listeners": names of what listens on a bus, or null};
@@ -127,8 +127,8 @@ class Sandbox:
         try:
             if command.confined and self.places is None and not self.is_on_host:
                 self.places = Places(command.confined.folder, places.own_user())
-            pid = self.children.start(command, output, self.places, may_fork=not self.is_on_host)
-            self.send(started=command.name, pid=pid)
+            self.children.start(command, output, self.places, may_fork=not self.is_on_host)
+            self.send(started=command.name)
         except (OSError, subprocess.SubprocessError, ValueError, NoSeccomp) as error:
             why = getattr(error, "strerror", None) or str(error)
             self.send(unstartable=command.name, why=f"{getattr(error, 'filename', None) or command.argv[0]}: {why}")
