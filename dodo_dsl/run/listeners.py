@@ -1,7 +1,8 @@
 """Which programs of a test listen on an OpenDLV bus, by what the kernel says of their sockets."""
 
+import contextlib
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from dodo_dsl.opendlv.address import PORT
@@ -23,8 +24,8 @@ def listening(services: Mapping[int, str], proc: Path = _PROC) -> set[str] | Non
     found, seen, hidden = set(), set(), set()
     for pid, name in owners(services, living(proc)).items():
         try:
-            if name not in found and (own := _sockets(proc / str(pid))):
-                found |= set() if own.isdisjoint(_at_the_port(proc / str(pid))) else {name}
+            if name not in found and (own := _sockets(proc / str(pid))) and own & _at_the_port(proc / str(pid)):
+                found.add(name)
             seen.add(name)
         except (FileNotFoundError, ProcessLookupError):  # it has ended meanwhile
             continue
@@ -50,15 +51,11 @@ def buses(processes: Iterable[int], proc: Path = _PROC) -> set[int]:
 
 def _sockets(process: Path) -> set[str]:
     """The inodes of a process's sockets; raises OSError."""
-    return {link.removeprefix(_SOCKET).rstrip("]") for link in _links(process / "fd") if link.startswith(_SOCKET)}
-
-
-def _links(folder: Path) -> Iterator[str]:
-    for entry in folder.iterdir():
-        try:
-            yield str(entry.readlink())
-        except FileNotFoundError:  # it was closed meanwhile
-            continue
+    links = []
+    for entry in (process / "fd").iterdir():
+        with contextlib.suppress(FileNotFoundError):  # it was closed meanwhile
+            links.append(str(entry.readlink()))
+    return {link.removeprefix(_SOCKET).rstrip("]") for link in links if link.startswith(_SOCKET)}
 
 
 def _at_the_port(process: Path) -> set[str]:

@@ -12,7 +12,6 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
 
 from dodo_dsl.run import leases
 from dodo_dsl.state_folder import secured
@@ -22,29 +21,24 @@ FOLDER_PREFIX = "dodo-run-"
 
 @dataclass
 class WorkFolder:
-    """A leased folder that exists within the block, and stays where ``kept`` was set."""
-
     path: Path
     lease: leases.Lease
     kept: bool = False
 
-    def __enter__(self) -> Self:
-        self.path.mkdir(mode=0o700)
-        return self
 
-    def __exit__(self, *_: object) -> None:
-        if self.kept:
-            self.lease.leave()
-        else:
-            _remove(self.path, self.lease)
-
-
-def work_folder() -> WorkFolder:
+@contextlib.contextmanager
+def work_folder() -> Iterator[WorkFolder]:
+    """A leased folder that exists within the block, and stays where ``kept`` was set."""
     token = secrets.token_hex(4)
     path = Path(tempfile.gettempdir()).resolve() / f"{FOLDER_PREFIX}{token}"
     lease = leases.try_lease(f"{leases.RUN}{token}", {"folder": str(path)})
     assert lease is not None, "a fresh name is free"
-    return WorkFolder(path, lease)
+    folder = WorkFolder(path, lease)
+    path.mkdir(mode=0o700)
+    try:
+        yield folder
+    finally:
+        lease.leave() if folder.kept else _remove(path, lease)
 
 
 def reap_folders() -> None:
@@ -60,12 +54,6 @@ def _channels() -> Path:
     return Path(tempfile.gettempdir()).resolve() / f"dodo-channels-{os.geteuid()}"
 
 
-def _remove_place() -> None:
-    """Removes the place of all channels, unless a test has one there."""
-    with contextlib.suppress(OSError):
-        _channels().rmdir()
-
-
 @contextlib.contextmanager
 def meeting_place(work: Path, keep: bool) -> Iterator[str]:
     """A folder where the services of a test of the run with a ``work`` folder meet; ``keep`` leaves it."""
@@ -77,13 +65,18 @@ def meeting_place(work: Path, keep: bool) -> Iterator[str]:
         yield folder
     finally:
         if not keep:
-            shutil.rmtree(folder, ignore_errors=True)
-            _remove_place()
+            _clear(Path(folder))
+
+
+def _clear(*folders: Path) -> None:
+    """Removes folders, and the place of all channels, unless a test has one there."""
+    for folder in folders:
+        shutil.rmtree(folder, ignore_errors=True)
+    with contextlib.suppress(OSError):
+        _channels().rmdir()
 
 
 def _remove(folder: Path, lease: leases.Lease) -> None:
     """Removes a folder; where that fails its record stays, and the next run tries again."""
-    for each in (folder, *_channels().glob(f"{folder.name}-*")):
-        shutil.rmtree(each, ignore_errors=True)
-    _remove_place()
+    _clear(folder, *_channels().glob(f"{folder.name}-*"))
     lease.leave() if folder.exists() else lease.release()

@@ -36,17 +36,13 @@ class Process(NamedTuple):
 
 
 def table(proc: Path = PROC) -> dict[int, Process]:
-    pids = (int(entry.name) for entry in proc.iterdir() if entry.name.isdigit())
-    return {pid: process for pid in pids if (process := _process(pid, proc))}
-
-
-def _process(pid: int, proc: Path) -> Process | None:
-    try:
-        words = (proc / str(pid) / "stat").read_bytes().rpartition(b")")[2].split()
-    except OSError:  # it has ended meanwhile
-        return None
-    parent, session, start = (int(words[place]) for place in (_PARENT, _SESSION, _START))
-    return Process(parent, session, start, sum(map(int, words[_TIMES])), words[_STATE] == b"Z")
+    found = {}
+    for pid in (int(entry.name) for entry in proc.iterdir() if entry.name.isdigit()):
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            words = (proc / str(pid) / "stat").read_bytes().rpartition(b")")[2].split()
+            parent, session, start = (int(words[place]) for place in (_PARENT, _SESSION, _START))
+            found[pid] = Process(parent, session, start, sum(map(int, words[_TIMES])), words[_STATE] == b"Z")
+    return found
 
 
 def living(proc: Path = PROC) -> dict[int, Process]:
@@ -70,15 +66,12 @@ def owners(services: Mapping[int, str], known: Mapping[int, Process]) -> dict[in
 
 def above(limits: Mapping[str, int], services: Mapping[int, str], proc: Path = PROC) -> dict[str, int]:
     """Bytes of memory of the services that use more than their limits, by name; see ``owners``."""
-    found, memories, owned = {}, segments(proc), owners(services, living(proc))
-    for name, most in limits.items():
-        pids = [pid for pid, owner in owned.items() if owner == name]
-        if (size := memory(pids, memories, proc)) > most:
-            found[name] = size
-    return found
+    memories, owned = segments(proc), owners(services, living(proc))
+    sizes = {name: memory([pid for pid in owned if owned[pid] == name], memories, proc) for name in limits}
+    return {name: size for name, size in sizes.items() if size > limits[name]}
 
 
-def memory(pids: Collection[int], segments: Iterable["Segment"], proc: Path = PROC) -> int:
+def memory(pids: Collection[int], segments: Collection["Segment"], proc: Path = PROC) -> int:
     """Bytes that processes use together. What they share counts once, if this user may know it.
 
     Of shared memory the larger counts: what is mapped, or what only descriptors and attached System V memories hold.
@@ -87,7 +80,10 @@ def memory(pids: Collection[int], segments: Iterable["Segment"], proc: Path = PR
     if sum(map(sum, sizes)) - max(map(sum, sizes), default=0) > _SMALL:
         sizes = [_sizes(f"{proc}/{pid}/smaps_rollup") or size for pid, size in zip(pids, sizes, strict=True)]
     anonymous, shared = (sum(size[part] for size in sizes) for part in (0, 1))
-    attached, detached = _of_service(segments, pids, proc)
+    attached, detached = (
+        sum(each.size for each in segments if each.is_attached == kind and _is_of(each, pids, proc))
+        for kind in (True, False)
+    )
     return anonymous + max(shared, _held(pids, proc) + attached) + detached
 
 
@@ -133,15 +129,11 @@ def segments(proc: Path = PROC) -> list[Segment]:
     return []
 
 
-def _of_service(found: Iterable[Segment], pids: Collection[int], proc: Path) -> tuple[int, int]:
-    """Bytes of System V memories of a service: those with processes attached, and others.
+def _is_of(segment: Segment, pids: Collection[int], proc: Path) -> bool:
+    """Whether a System V memory is of the service that has these processes, one of which created it.
 
-    They are of the service whose process created them. Where the creator has ended, they are of every service, if this
-    process is the first of its namespaces: elsewhere they may be of anybody.
+    Where the creator has ended, it is of every service, if this process is the first of its namespaces: elsewhere it
+    may be of anybody.
     """
-    attached = detached = 0
-    for creator, size, is_attached in found:
-        is_orphan = creator > 0 and os.getpid() == 1 and not (proc / str(creator)).exists()
-        if creator in pids or is_orphan:
-            attached, detached = attached + size * is_attached, detached + size * (not is_attached)
-    return attached, detached
+    creator = segment.creator
+    return creator in pids or (creator > 0 and os.getpid() == 1 and not (proc / str(creator)).exists())

@@ -101,7 +101,7 @@ class Children:
     def start(self, command: Command, output: int, places: Places | None, may_fork: bool) -> None:
         """Starts a process; a module of DoDo's is forked where it ``may_fork``.
 
-        Raises OSError, SubprocessError, ValueError and NoSeccomp.
+        Raises OSError, SubprocessError and ValueError.
         """
         child = _Child(command.name)
         if command.confined:

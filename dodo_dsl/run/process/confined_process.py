@@ -27,13 +27,13 @@ def start(
 ) -> tuple[subprocess.Popen[bytes], int, ProcessGroup | None]:
     """Bubblewrap's process, which ends with the program and gives its exit code, and a descriptor for ``ended``.
 
-    ``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp.
+    ``places`` is None on the host. Raises OSError, SubprocessError and ValueError.
     """
     program = _found(command.argv[0], command.environment, confined.folder)
     user = places.user if places else None
     given = {**command.environment, **({"HOME": confinement.HOME} if places else {})}
     others = 0 if user is not None else _threads_of_this_user()
-    sandbox = confinement.sandbox_words(confined, places, program, given)
+    sandbox = confinement.sandbox_words(confined, places, program, given, command.masked)
     filtered = {"--seccomp": seccomp_filter.program()} if places else {}
     group = process_group.make(confined.limits.processes)
     said, status = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)

@@ -25,14 +25,13 @@ SYSTEM = ("/usr", "/etc", "/opt", "/sys/devices/system")
 class Confinement:
     """``folder`` is the application's own, ``reads`` is what else it may read, ``hidden`` lies in them and stays out.
 
-    On the host it has only its own processes, and sees what DoDo sees but for ``masked`` devices.
+    On the host it has only its own processes, and sees what DoDo sees but for devices that are masked.
     """
 
     folder: str
     reads: tuple[str, ...] = ()
     hidden: tuple[str, ...] = ()
     limits: SandboxLimits = field(default_factory=SandboxLimits)
-    masked: tuple[str, ...] = ()
     channels: str = ""
     """On the host: where services of all tests meet, which it must not see."""
     time: str = ""
@@ -55,20 +54,18 @@ class Command:
     confined: Confinement | None = None
 
 
-def confinement(folder: Path, limits: SandboxLimits, hidden: Iterable[Path]) -> Confinement:
-    """The confinement of an application; of the ``hidden`` paths, those matter that it would see."""
-    reads = [str((folder / Path(path).expanduser()).resolve()) for path in limits.reads]
-    every = tuple(dict.fromkeys([*INTERPRETER, str(_PACKAGE), *reads]))
-    inside = _inside(hidden, (*SYSTEM, *every, str(folder)))
-    return Confinement(str(folder), every, tuple(dict.fromkeys(inside)), limits)
+def readable(folder: Path, limits: SandboxLimits, *more: Path) -> tuple[str, ...]:
+    """What an application may read beside its ``folder``."""
+    allowed = ((folder / Path(path).expanduser()).resolve() for path in limits.reads)
+    return tuple(dict.fromkeys(map(str, (*INTERPRETER, _PACKAGE, *allowed, *more))))
 
 
-def _inside(hidden: Iterable[Path], shown: Iterable[str]) -> Iterator[str]:
-    """The paths below those that are shown, by each of their names."""
+def _inside(hidden: Iterable[str], shown: Iterable[str]) -> Iterator[str]:
+    """The paths that are there below those that are shown, by each of their names."""
     real = {Path(path): Path(os.path.realpath(path)) for path in shown}
-    for path in hidden:
+    for path in map(Path, hidden):
         for name, place in real.items():
-            if path != place and path.is_relative_to(place):
+            if path != place and path.is_relative_to(place) and path.exists():
                 yield str(name / path.relative_to(place))
 
 
@@ -82,16 +79,20 @@ _TO_UNMASK = ("CAP_SYS_ADMIN", "CAP_MKNOD", "CAP_DAC_READ_SEARCH", "CAP_SYS_MODU
 
 
 def sandbox_words(
-    confined: Confinement, places: Places | None, program: str, environment: Mapping[str, str]
+    confined: Confinement,
+    places: Places | None,
+    program: str,
+    environment: Mapping[str, str],
+    masked: Iterable[str] = (),
 ) -> list[str]:
-    """What bubblewrap is to do, but for descriptors; ``places`` is None on the host.
+    """What bubblewrap is to do, but for descriptors; ``places`` is None on the host, where devices are ``masked``.
 
     ``program`` is the path of the application's program, which is shown where nothing else would.
     """
     words = ["--unshare-pid", "--die-with-parent", "--clearenv"]
     words += [word for name, value in environment.items() for word in ("--setenv", name, value)]
     if places is None:
-        words += ["--dev-bind", "/", "/", *_masked(confined.masked, confined.channels), "--proc", "/proc"]
+        words += ["--dev-bind", "/", "/", *_masked(masked, confined.channels), "--proc", "/proc"]
     else:
         words += ["--unshare-uts", "--hostname", "application", "--unshare-cgroup-try", "--cap-drop", "ALL"]
         words += _seen(confined, places, program)
@@ -125,7 +126,8 @@ def _seen(confined: Confinement, places: Places, program: str) -> list[str]:
     shown |= {path: ["--ro-bind-try", str(places.read(path)), path] for path in reads}
     own = {path: ["--bind", str(source), path] for path, source in {**places.shared, HOME: places.home}.items()}
     own[confined.folder] = ["--bind" if places.writable else "--ro-bind", str(places.folder), confined.folder]
-    hidden = {*filter(os.path.exists, confined.hidden), *places.mounted} - {*reads, *own}
+    inside = _inside(confined.hidden, (*SYSTEM, *confined.reads, confined.folder))
+    hidden = {*inside, *places.mounted} - {*reads, *own}
     words = ["--proc", "/proc", "--dev", "/dev", *(word for path in _EMPTY for word in ("--dir", path))]
     shows: dict[str, bool | None] = {"/": False}
     """Whether what is mounted at a path shows what lies there; None where that is another folder."""

@@ -7,10 +7,9 @@ from pathlib import Path
 
 from dodo_dsl.application import secret_variables
 
-_FOR_APPLICATIONS = ("PATH", "HOME", "USER", "LANG", "TZ", "TERM")
-_FOR_PROGRAMS = ("VIRTUAL_ENV", "LD_LIBRARY_PATH", "PYTHONPATH", "CLUON_SHAREDMEMORY_POSIX")
-"""Where programs and libraries are, and how libcluon shares memory: set once for DoDo and all that it starts."""
-_LOCALE = "LC_"
+_FOR_APPLICATIONS = ("PATH", "HOME", "USER", "LANG", "TZ", "TERM", "PYTHONUNBUFFERED", "VIRTUAL_ENV",
+                     "LD_LIBRARY_PATH", "PYTHONPATH", "CLUON_SHAREDMEMORY_POSIX")  # fmt: skip
+"""Also where programs and libraries are, and how libcluon shares memory: set once for DoDo and all that it starts."""
 
 
 def own_environment(passed: Collection[str] = ()) -> dict[str, str]:
@@ -26,7 +25,5 @@ def base_environment(passed: Collection[str] = ()) -> dict[str, str]:
 
 def application_environment(passed: Collection[str] = ()) -> dict[str, str]:
     """What a process of the application gets of DoDo's own environment: what it needs to run, and what is passed."""
-    names = {*_FOR_APPLICATIONS, *_FOR_PROGRAMS, "PYTHONUNBUFFERED", *passed}
-    return {
-        name: value for name, value in base_environment(passed).items() if name in names or name.startswith(_LOCALE)
-    }
+    given, names = base_environment(passed), {*_FOR_APPLICATIONS, *passed}
+    return {name: value for name, value in given.items() if name in names or name.startswith("LC_")}

@@ -1,11 +1,8 @@
 """The fork server: a process that has loaded what DoDo's services need, and forks the sandboxes of tests.
 
 Loading numpy, OpenCV and similar takes most of the processor time of a short test's set-up. Sandboxes with their own
-namespaces are forked from here; their services are forks of them in turn.
-
-    runner to fork server   {"load": [module of a service of DoDo's, ...]};
-                            the same with "process" and "shown" of what a sandbox enters, and descriptors of its end of
-                            its channel, of its log, and of leases that it holds, too: it is forked
+namespaces are forked from here; their services are forks of them in turn. The runner's messages name modules to load;
+with what a sandbox enters, and descriptors, it is forked.
 """
 
 import contextlib
@@ -47,15 +44,13 @@ class ForkServer:
 
     def load(self, modules: Iterable[str]) -> None:
         """Lets the sandboxes to come have loaded these services of DoDo's."""
-        self._send({"load": sorted(modules)})
+        self._send([sorted(modules), 0, []])
 
     def fork(self, entered: Entered, modules: Iterable[str], descriptors: Sequence[int]) -> None:
-        """Starts a sandbox that has loaded modules; the first ``descriptors`` are its end of a channel, and its log."""
-        self._send(
-            {"load": sorted(modules), "process": entered.process, "shown": [*map(str, entered.shown)]}, descriptors
-        )
+        """Starts a sandbox that has loaded modules; ``descriptors`` are its end of a channel, its log, and leases."""
+        self._send([sorted(modules), entered.process, [*map(str, entered.shown)]], descriptors)
 
-    def _send(self, message: dict[str, object], descriptors: Sequence[int] = ()) -> None:
+    def _send(self, message: list[object], descriptors: Sequence[int] = ()) -> None:
         with contextlib.suppress(OSError):  # it has ended, which a sandbox's channel says
             socket.send_fds(self._socket, [json.dumps(message).encode()], descriptors)
 
@@ -81,24 +76,6 @@ LOADED = (
 """What most services import."""
 
 
-def load() -> None:
-    """Imports what most services need, which the garbage collection of the forks leaves alone."""
-    gc.disable()
-    _import(LOADED)
-    from dodo_dsl.opendlv.message_set import MessageSet
-
-    MessageSet.standard()
-    gc.freeze()
-
-
-def load_services(modules: Iterable[str]) -> None:
-    """Imports what these services of DoDo's consist of."""
-    for module in modules:
-        _import([module, f"{module}.__main__"])
-        sys.modules.pop(f"{module}.__main__", None)  # it runs as __main__
-    gc.freeze()
-
-
 def _import(names: Iterable[str]) -> None:
     """Imports modules without starting threads; those that are not installed are skipped."""
     before = dict(os.environ)
@@ -111,19 +88,21 @@ def _import(names: Iterable[str]) -> None:
 
 
 def serve(runner: socket.socket) -> None:
-    """Loads and forks as the runner's messages say, until it closes the socket."""
+    """Loads and forks as the runner says, until it closes the socket."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # the kernel collects the forks
     while True:
         data, descriptors, _, _ = socket.recv_fds(runner, _MAX_MESSAGE, _MAX_DESCRIPTORS)
         if not data:
             return
-        message = json.loads(data)
-        load_services(message["load"])
+        modules, process, shown = json.loads(data)
+        for module in modules:
+            _import([module, f"{module}.__main__"])
+            sys.modules.pop(f"{module}.__main__", None)  # it runs as __main__
+        gc.freeze()
         if descriptors and os.fork() == 0:
             runner.close()
-            entered = Entered(message["process"], tuple(map(Path, message["shown"])))
-            os._exit(_sandbox(descriptors[0], descriptors[1], entered))
+            os._exit(_sandbox(descriptors[0], descriptors[1], Entered(process, tuple(map(Path, shown)))))
         for descriptor in descriptors:
             os.close(descriptor)
 
@@ -146,10 +125,13 @@ def _sandbox(channel: int, log: int, entered: Entered) -> int:
 
 def main(argv: list[str]) -> int:
     """``fork_server DESCRIPTOR``: serves the runner at the other end of the descriptor."""
-    runner = socket.socket(fileno=int(argv[0]))
-    load()
+    gc.disable()  # what is loaded now, the garbage collection of the forks leaves alone
+    _import(LOADED)
+    from dodo_dsl.opendlv.message_set import MessageSet
+
+    MessageSet.standard()
     with contextlib.suppress(OSError):
-        serve(runner)
+        serve(socket.socket(fileno=int(argv[0])))
     return 0
 
 

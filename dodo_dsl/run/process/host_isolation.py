@@ -12,10 +12,9 @@ from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from dodo_dsl.opendlv.address import group
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
-from dodo_dsl.run.process import leftovers, seccomp_filter
+from dodo_dsl.run.process import seccomp_filter
 from dodo_dsl.run.process.confinement import MERGED, PROGRAM
-from dodo_dsl.run.process.leftovers import end_slot, remove_memories
-from dodo_dsl.run.process.seccomp_filter import NoSeccomp
+from dodo_dsl.run.process.leftovers import end_slot, remove_left, remove_memories
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.spec.deployment import RESERVED_CIDS
@@ -27,19 +26,13 @@ def isolation_refusal(on_host: bool = False) -> str:
     """Why applications cannot have their own namespaces, on the host that of processes alone; empty when they can."""
     seen = [word for path in ("/usr", *MERGED) for word in ("--ro-bind-try", path, path)]
     words = [PROGRAM, "--unshare-pid", *([] if on_host else ["--unshare-net", "--unshare-ipc"]), *seen]
+    words += ["--proc", "/proc", "--dev", "/dev", "--", "true"]
     try:
         seccomp_filter.program()
-        done = subprocess.run(
-            [*words, "--proc", "/proc", "--dev", "/dev", "--", "true"],
-            capture_output=True,
-            text=True,
-            check=False,
-            stdin=subprocess.DEVNULL,
-            timeout=10,
-        )
+        done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=10)
     except FileNotFoundError:
         return f"there is no program '{PROGRAM}': install bubblewrap"
-    except (OSError, subprocess.TimeoutExpired, NoSeccomp) as error:
+    except (OSError, subprocess.TimeoutExpired) as error:
         return str(error)
     if done.returncode == 0:
         return ""
@@ -74,23 +67,21 @@ async def host_slot(
     held: list[leases.Lease] = []
     try:
         held.append(await leases.lease_any(["machine"], about, say, shared=not alone))
-        order = [plan.cid, *(c for c in cids if c != plan.cid)]
-        held.append(lease := await leases.lease_any([f"{leases.CID}{c}" for c in order], about, say))
-        leftovers.remove_left(lease)
+        order = dict.fromkeys((plan.cid, *cids))
+        held.append(lease := await leases.lease_any([f"{leases.CID}{cid}" for cid in order], about, say))
+        remove_left(lease)
         cid = int(lease.name.removeprefix(leases.CID))
-        foreigner = await asyncio.get_running_loop().run_in_executor(None, listen, cid)
-        if foreigner:
+        if foreigner := await asyncio.to_thread(listen, cid):
             raise BackendError(
                 f"CID {cid} carries foreign traffic from {foreigner}; end it, or set another range of CIDs"
             )
-        yield Slot(cid, name, "" if alone else name, tuple(held_lease.descriptor for held_lease in held))
+        yield Slot(cid, name, "" if alone else name, tuple(each.descriptor for each in held))
     finally:
         if not keep:
             await asyncio.shield(asyncio.to_thread(end_slot, name))  # before its leases are released
-        for held_lease in reversed(held):
-            held_lease.leave() if keep else held_lease.release()
-        if not keep:
             remove_memories(name)
+        for each in reversed(held):
+            each.leave() if keep else each.release()
 
 
 @contextlib.contextmanager

@@ -7,6 +7,7 @@ in them those stay visible that the test needs, so that programs and specs kept 
 import contextlib
 import ctypes
 import errno
+import fcntl
 import functools
 import os
 import signal
@@ -59,7 +60,7 @@ def begin(parent: int, masked: Sequence[str] = ()) -> None:
     It sees /dev/null in the place of ``masked`` device files; raises OSError.
     """
     if masked:
-        _unshare(_CLONE_NEWNS)
+        unshare(_CLONE_NEWNS)
         _call("mount", b"none", b"/", None, _MS_REC | _MS_SLAVE, None)
     for device in masked:
         bind(Path("/dev/null"), Path(device), deep=False)
@@ -73,12 +74,8 @@ def adopt_orphans() -> None:
     _call("prctl", _PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
-def unshare() -> None:
+def unshare(flags: int = _CLONE_NEWNET | _CLONE_NEWIPC | _CLONE_NEWNS | _CLONE_NEWPID) -> None:
     """Leaves the host's namespaces; the next fork is process 1 in them. Raises OSError where the kernel refuses."""
-    _unshare(_CLONE_NEWNET | _CLONE_NEWIPC | _CLONE_NEWNS | _CLONE_NEWPID)
-
-
-def _unshare(flags: int) -> None:
     user, group = os.getuid(), os.getgid()
     if user == 0:
         _call("unshare", flags)
@@ -115,23 +112,22 @@ def furnish(shown: Collection[Path], trees: Mapping[Path, int]) -> None:
     are empty to the other process, but no files: they may be another test's tokens.
     """
     _call("mount", b"none", b"/", None, _MS_REC | _MS_PRIVATE, None)
-    _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
+    mount("proc", Path("/proc"), "")
     for folder in filter(Path.is_dir, SHARED):
         old = os.open(folder, os.O_PATH | os.O_DIRECTORY)
         if trees:
             _syscall(_MOVE_MOUNT, trees[folder], b"", _AT_FDCWD, bytes(folder), _MOVE_MOUNT_F_EMPTY_PATH)
             os.close(trees[folder])
         else:
-            mount_tmpfs(folder, _SHARED_SIZE)
+            mount("tmpfs", folder, _SHARED_SIZE)
         _bind_old(old, folder, shown)
     if not trees:
-        _loopback_up()
-        _multicast_route()
+        _multicast()
 
 
-def mount_tmpfs(folder: Path, options: str) -> None:
-    """An empty file system in memory at a folder; raises OSError."""
-    _call("mount", b"tmpfs", bytes(folder), b"tmpfs", _MS_NOSUID | _MS_NODEV, options.encode())
+def mount(kind: str, folder: Path, options: str) -> None:
+    """A new file system at a folder, where no device and no change of user counts; raises OSError."""
+    _call("mount", kind.encode(), bytes(folder), kind.encode(), _MS_NOSUID | _MS_NODEV, options.encode())
 
 
 def bind(source: Path, target: Path, *, deep: bool) -> None:
@@ -191,12 +187,6 @@ def user_namespace(mapping: str, owner: int = 0) -> int:
         os.waitpid(child, 0)
 
 
-def overlay(lower: Path, upper: Path, work: Path, target: Path) -> None:
-    """Shows ``lower`` at ``target``, where what is written goes to ``upper``; raises OSError."""
-    options = f"lowerdir={lower},upperdir={upper},workdir={work}"
-    _call("mount", b"overlay", bytes(target), b"overlay", _MS_NOSUID | _MS_NODEV, options.encode())
-
-
 def _bind_old(old: int, folder: Path, shown: Collection[Path]) -> None:
     """Shows what is ``shown`` of an old folder in the new one that took its place, and closes the ``old`` descriptor.
 
@@ -211,24 +201,17 @@ def _bind_old(old: int, folder: Path, shown: Collection[Path]) -> None:
     os.close(old)
 
 
-def _loopback_up() -> None:
+def _multicast() -> None:
+    """``lo`` is up; 224.0.0.0/4 goes through it, from 127.0.0.1 (rtnetlink): without that a join has no device."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
-        import fcntl
-
-        request = struct.pack("16sh14x", b"lo", _IFF_UP | _IFF_RUNNING)
-        fcntl.ioctl(control, _SIOCSIFFLAGS, request)
-
-
-def _attribute(kind: int, value: bytes) -> bytes:
-    return struct.pack("HH", 4 + len(value), kind) + value
-
-
-def _multicast_route() -> None:
-    """224.0.0.0/4 through ``lo`` with source 127.0.0.1 (rtnetlink); without it a join has no device."""
-    loopback = struct.pack("i", socket.if_nametoindex("lo"))
+        fcntl.ioctl(control, _SIOCSIFFLAGS, struct.pack("16sh14x", b"lo", _IFF_UP | _IFF_RUNNING))
     body = struct.pack("BBBBBBBBI", socket.AF_INET, 4, 0, 0, 254, 3, 253, 1, 0)
-    body += _attribute(_RTA_DST, socket.inet_aton("224.0.0.0")) + _attribute(_RTA_OIF, loopback)
-    body += _attribute(_RTA_PREFSRC, socket.inet_aton("127.0.0.1"))
+    for kind, value in (
+        (_RTA_DST, socket.inet_aton("224.0.0.0")),
+        (_RTA_OIF, struct.pack("i", socket.if_nametoindex("lo"))),
+        (_RTA_PREFSRC, socket.inet_aton("127.0.0.1")),
+    ):
+        body += struct.pack("HH", 4 + len(value), kind) + value
     flags = _NLM_F_REQUEST | _NLM_F_ACK | _NLM_F_CREATE
     message = struct.pack("IHHII", 16 + len(body), _RTM_NEWROUTE, flags, 1, 0) + body
     with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as netlink:

@@ -16,7 +16,6 @@ from pathlib import Path
 
 from dodo_dsl.run.process import namespaces
 
-_SIZE = "size=1g,mode=0755"
 _MODE = 0o755
 _SYSTEM = Path("/usr")
 """What packages of the system install: everybody can read it."""
@@ -31,10 +30,12 @@ class Places:
         self.user = user
         """The user that the application runs as; None for the user of this process."""
         self._root = Path(tempfile.mkdtemp(prefix="dodo-application-", dir=namespaces.SHARED[0]))  # the sandbox's own
-        namespaces.mount_tmpfs(self._root, _SIZE)
+        namespaces.mount("tmpfs", self._root, "size=1g,mode=0755")
         self.home = self._made("home", is_own=True)
-        self.shared = {str(place): self._shallow(place) for place in namespaces.SHARED if place.is_dir()}
+        self.shared = {str(place): self._made(place.name) for place in namespaces.SHARED if place.is_dir()}
         """``/tmp`` and ``/dev/shm`` by their names, without the host's folders that are mounted there."""
+        for place, target in self.shared.items():
+            namespaces.bind(Path(place), target, deep=False)
         self.namespace = None if user is None else namespaces.user_namespace(f"{user} {user} 1\n", user)
         """The descriptor of that user's own namespace, which bubblewrap enters where it is not to make one."""
         self.mounted = tuple(str(path) for place in self.shared for path in Path(place).iterdir() if path.is_mount())
@@ -42,11 +43,6 @@ class Places:
         self._read: dict[str, Path] = {}
         self.folder, self.writable = self._overlaid(Path(folder))
         """Where its folder is shown, the same for all services; what is written there goes nowhere else."""
-
-    def _shallow(self, place: Path) -> Path:
-        target = self._made(place.name)
-        namespaces.bind(place, target, deep=False)
-        return target
 
     def _made(self, name: str, is_own: bool = False) -> Path:
         path = self._root / name
@@ -64,7 +60,7 @@ class Places:
             why = "readable for its owner alone, and this kernel cannot show it to the application's user"
             raise PermissionError(errno.EACCES, why, str(folder))
         try:
-            namespaces.overlay(lower, upper, work, merged)
+            namespaces.mount("overlay", merged, f"lowerdir={lower},upperdir={upper},workdir={work}")
         except OSError:  # as some file systems refuse: then it can only be read
             return lower, False
         return merged, True

@@ -37,7 +37,6 @@ from dodo_dsl.run.process import namespaces, places
 from dodo_dsl.run.process.children import Children
 from dodo_dsl.run.process.confinement import Command
 from dodo_dsl.run.process.places import Places
-from dodo_dsl.run.process.seccomp_filter import NoSeccomp
 from dodo_dsl.run.process.slot import Entered
 
 PERIOD_S = 0.25
@@ -52,16 +51,13 @@ class Sandbox:
     def __init__(self, channel: socket.socket, is_on_host: bool) -> None:
         self.channel = channel
         self.is_on_host = is_on_host
-        umask = -1 if is_on_host else UMASK
         self.use = UseReader()
-        self.children = Children(self._exited, umask)
+        self.children = Children(self._exited, -1 if is_on_host else UMASK)
         self.places: Places | None = None
         self.relay: Relay | None = None
         self.keep = False
         self.ended = False
-        self.wakeup, writer = os.pipe()
-        os.set_blocking(self.wakeup, False)
-        os.set_blocking(writer, False)
+        self.wakeup, writer = os.pipe2(os.O_NONBLOCK)
         signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
         for number in (signal.SIGCHLD, signal.SIGTERM):
             signal.signal(number, self._on_signal)
@@ -107,10 +103,9 @@ class Sandbox:
 
     def _serve(self) -> bool:
         """Carries out one message; False when the runner has closed the channel."""
-        try:
+        data = b""
+        with contextlib.suppress(OSError):
             data, descriptors, _, _ = socket.recv_fds(self.channel, MAX_MESSAGE, MAX_DESCRIPTORS)
-        except OSError:
-            return False
         if not data:
             return False
         message = json.loads(data)
@@ -129,7 +124,7 @@ class Sandbox:
                 self.places = Places(command.confined.folder, places.own_user())
             self.children.start(command, output, self.places, may_fork=not self.is_on_host)
             self.send(started=command.name)
-        except (OSError, subprocess.SubprocessError, ValueError, NoSeccomp) as error:
+        except (OSError, subprocess.SubprocessError, ValueError) as error:
             why = getattr(error, "strerror", None) or str(error)
             self.send(unstartable=command.name, why=f"{getattr(error, 'filename', None) or command.argv[0]}: {why}")
 

@@ -1,4 +1,4 @@
-"""The runner's end of a test's sandbox: starts it and exchanges messages, whose shapes ``sandbox`` documents."""
+"""The runner's end of a test's sandbox, with messages as ``sandbox`` documents them."""
 
 import asyncio
 import contextlib
@@ -29,11 +29,7 @@ END_S = 10.0
 class SandboxClient:
     """One sandbox; ``on_message`` gets its messages, ``on_lost`` the reason when it is out of reach."""
 
-    def __init__(
-        self,
-        on_message: Callable[[dict[str, Any]], None],
-        on_lost: Callable[[str], None],
-    ) -> None:
+    def __init__(self, on_message: Callable[[dict[str, Any]], None], on_lost: Callable[[str], None]) -> None:
         self._on_message = on_message
         self._on_lost = on_lost
         self.pid: int | None = None

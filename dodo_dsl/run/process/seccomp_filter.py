@@ -25,24 +25,20 @@ _F_SETLEASE = 1024
 _TIOCSTI, _TIOCLINUX = 0x5412, 0x541C
 
 
-class NoSeccomp(Exception):
-    """The filter cannot be made on this machine; the text says why."""
-
-
 @functools.cache
 def program() -> bytes:
-    """The filter as the kernel reads it (struct sock_filter, seccomp(2)); raises NoSeccomp."""
+    """The filter as the kernel reads it (struct sock_filter, seccomp(2)); raises OSError."""
     try:
         import pyseccomp as seccomp
     except (ImportError, RuntimeError, OSError) as error:
-        raise NoSeccomp(f"libseccomp cannot be loaded: {error}") from None
+        raise OSError(f"libseccomp cannot be loaded: {error}") from None
     rules = seccomp.SyscallFilter(seccomp.ALLOW)
     refused = seccomp.ERRNO(_EPERM)
     for name in _REFUSED:
         try:
             rules.add_rule(refused, name)  # for a call that only other processors have, that is nothing
         except OSError as error:
-            raise NoSeccomp(f"libseccomp does not know the system call {name}, it is too old: {error}") from None
+            raise OSError(f"libseccomp does not know the system call {name}, it is too old: {error}") from None
     for flag in (1 << bit for bit in range(32) if _CLONE_NAMESPACES >> bit & 1):
         rules.add_rule(refused, "clone", seccomp.Arg(0, seccomp.MASKED_EQ, flag, flag))
     rules.add_rule(seccomp.ERRNO(_ENOSYS), "clone3")  # its flags lie in memory; libraries use clone then

@@ -25,7 +25,7 @@ from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import Send
 from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.commands import Commands, needed_paths, own_modules
-from dodo_dsl.run.process.confinement import Command, Confinement, confinement
+from dodo_dsl.run.process.confinement import Command, Confinement, readable
 from dodo_dsl.run.process.fork_server import ForkServer
 from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
@@ -221,7 +221,11 @@ class ProcessSide:
         self._sandbox.send({"do": "send", "to": to, "data": data.hex()})
 
     def _start(self, command: Command) -> None:
-        output = self._output(command)
+        try:
+            output = self._output(command)
+        except OSError as error:
+            self._watched.not_started(command.name, f"no pseudo terminal is available: {error.strerror}")
+            return
         hidden = command.masked if self._is_on_host and self._is_apart else ()
         self._sandbox.start(replace(command, masked=hidden, confined=self._confined(command)), output.writer)
         output.release_writer()
@@ -229,11 +233,7 @@ class ProcessSide:
     def _output(self, command: Command) -> ServiceOutput:
         """On a terminal where its lines are messages: into a pipe, programs write many lines at once, and late."""
         if command.layer == APPLICATION and self._watched.prints(command.name):
-            try:
-                return self._watched.output(command.layer, command.name, terminal=True)
-            except OSError as error:
-                why = f"no pseudo terminal is available ({error.strerror}), and programs often print late into a pipe"
-                self._watched.note(f"'{command.name}' prints into a pipe: {why}")
+            return self._watched.output(command.layer, command.name, terminal=True)
         take = self._take_of_time if command.name == TIME else None
         return self._watched.output(command.layer, command.name, take)
 
@@ -245,29 +245,26 @@ class ProcessSide:
         """How an application's process is kept apart; None for DoDo's own services."""
         if command.layer != APPLICATION or not self._is_confined:
             return None
-        application = self._plan.application
-        hidden = [] if self._is_on_host else self._hidden
+        application, time = self._plan.application, self._commands.time
         limits = application.limits
-        limits = replace(limits, processes=limits.processes * len(application.services))  # of one user, as they count
-        if self._commands.time is not None:
-            limits = replace(limits, reads=(*limits.reads, str(self._commands.time.library)))
-        if command.name == BRIDGE:
-            limits = replace(limits, reads=(*limits.reads, str(package_data.services())))
-        return replace(
-            confinement(Path(command.folder), limits, hidden),
+        more = [*([time.library] if time else []), *([package_data.services()] if command.name == BRIDGE else [])]
+        return Confinement(
+            command.folder,
+            readable(Path(command.folder), limits, *more),
+            () if self._is_on_host else self._hidden,
+            replace(limits, processes=limits.processes * len(application.services)),  # of one user, as they count
             channels=str(Path(self._slot.channel).parent) if self._is_on_host else "",
             time=self._commands.time_folder if self._gives_time else "",
-            masked=command.masked,
         )
 
     @functools.cached_property
-    def _hidden(self) -> list[Path]:
+    def _hidden(self) -> tuple[str, ...]:
         """What it never sees, and what lies around its folder: its repository, the folders of this test."""
         application = self._plan.application
         known = hidden_paths(application, self._folder, self._report)
         roots = application_paths(application, self._folder).roots
         places = (self._folder, self._report, Path(self._slot.channel).parent)
-        return [*known, *own_data(), *roots, *(place.resolve() for place in places)]
+        return tuple(dict.fromkeys(map(str, (*known, *own_data(), *roots, *(place.resolve() for place in places)))))
 
     async def listeners(self) -> Collection[str] | None:
         """As the sandbox sees them; None when it does not answer."""

@@ -1,8 +1,4 @@
-"""What keeps tests of the process backend apart: slots, namespaces to enter, and the Python path.
-
-A sandbox enters its own namespaces, or those of a container, which the application shares. On the path Python finds
-services and sandboxes.
-"""
+"""What keeps tests of the process backend apart: slots, namespaces to enter, and the Python path."""
 
 import os
 import sys
@@ -48,11 +44,15 @@ class Entered:
         """With what in ``/tmp`` and ``/dev/shm`` holds ``needed`` paths, Python, DoDo, or those of ``_VARIABLES``."""
         own = (Path(sys.prefix), Path(sys.base_prefix), *(Path(place) for place in sys.path if place))
         given = named_paths(os.environ.get(name, "") for name in _VARIABLES)
-        every = (*needed, *own, *given)
-        names = {name for path in every for name in (os.path.abspath(path), os.path.realpath(path))}  # noqa: PTH100
-        inside = ((folder, name.relative_to(folder).parts) for folder in namespaces.SHARED for name in map(Path, names)
-                  if name.is_relative_to(folder))  # fmt: skip
-        return cls(process, tuple(sorted({folder / parts[0] for folder, parts in inside if parts})))
+        names = {
+            Path(name)
+            for path in (*needed, *own, *given)
+            for name in (os.path.abspath(path), os.path.realpath(path))  # noqa: PTH100
+        }
+        lines = ([name, *name.parents] for name in names)
+        return cls(
+            process, tuple(sorted({path for line in lines for path in line if path.parent in namespaces.SHARED}))
+        )
 
 
 def named_paths(words: Iterable[str]) -> list[Path]:

@@ -26,7 +26,7 @@ def test_what_is_hidden_is_hidden_by_each_name_of_its_folder(tmp_path: Path) -> 
     (tmp_path / "models" / "tests").mkdir(parents=True)
     (tmp_path / "link").symlink_to("models")
     shown = (str(tmp_path / "link"), str(tmp_path / "models"))
-    found = module._inside([tmp_path / "models" / "tests"], shown)
+    found = module._inside([str(tmp_path / "models" / "tests")], shown)
     assert list(found) == [f"{path}/tests" for path in shown]
 
 
@@ -75,5 +75,5 @@ def afresh() -> None:
 
 def test_a_call_that_cannot_be_filtered_is_an_error_and_not_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(seccomp_filter, "_REFUSED", ("mount", "call_of_the_future"))
-    with pytest.raises(seccomp_filter.NoSeccomp, match="does not know the system call call_of_the_future"):
+    with pytest.raises(OSError, match="does not know the system call call_of_the_future"):
         seccomp_filter.program()
