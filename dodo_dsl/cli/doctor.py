@@ -28,7 +28,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         removed, left = capabilities.clean()
         stderr.writelines(f"removed: {printable(line)}\n" for line in removed)
         stderr.writelines(f"cannot be removed: {printable(line)}\n" for line in left)
-    findings = capabilities.examine()
+    findings = [*capabilities.examine()]
     if options.json:
         stdout.write(json_text([dataclasses.asdict(f) for f in findings]))
     else:

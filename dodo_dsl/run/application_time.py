@@ -7,10 +7,9 @@ import hashlib
 import os
 import platform
 import shutil
-import stat
 import struct
 import subprocess
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,9 +55,9 @@ def built() -> ApplicationTime:
     sources = package_data.services() / "clock" / "native"
     files = sorted(path for path in sources.iterdir() if path.suffix in (".c", ".h") or path.name == "Makefile")
     if checkout := package_data.checkout():
-        ready = checkout / "build" / "time"
-        if _is_ready(ready) and min(_changed(ready / LIBRARY), _changed(ready / AGENT)) >= max(map(_changed, files)):
-            return ApplicationTime((ready / LIBRARY).resolve(), (ready / AGENT).resolve())
+        made = [(checkout / "build" / "time" / name).resolve() for name in (LIBRARY, AGENT)]
+        if _is_ready(made[0].parent) and min(map(_changed, made)) >= max(map(_changed, files)):
+            return ApplicationTime(*made)
     digest = hashlib.sha256(b"\0".join([platform.machine().encode(), *(path.read_bytes() for path in files)]))
     try:
         folder = secured(secured(cache_home() / "dodo") / f"time-{digest.hexdigest()[:16]}").resolve()
@@ -87,14 +86,12 @@ def _build(sources: Path, folder: Path) -> None:
     words = ["make", "--silent", "-C", str(sources), f"BUILD={folder}"]
     environment = {name: value for name, value in os.environ.items() if name not in _OF_MAKE}
     try:
-        done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=_BUILD_S, env=environment)
-        said = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise BackendError(f"DoDo's library cannot be built: {error}") from None
-    if done.returncode:
+        subprocess.run(words, capture_output=True, text=True, check=True, timeout=_BUILD_S, env=environment)
+    except (OSError, subprocess.SubprocessError) as error:
         for name in (LIBRARY, AGENT):
             (folder / name).unlink(missing_ok=True)
-        raise BackendError(f"DoDo's library cannot be built: {said[0]}")
+        said = (getattr(error, "stderr", "") or str(error)).strip().splitlines()
+        raise BackendError(f"DoDo's library cannot be built: {said[0]}") from None
 
 
 _INTERPRETER, _NOTE = 3, 4
@@ -122,11 +119,7 @@ Look = Callable[[Path], tuple[int, bytes] | None]
 
 def on_this_machine(path: Path) -> tuple[int, bytes] | None:
     """As Look, for a program that is started as a process."""
-    try:
-        mode = path.stat().st_mode
-    except OSError:
-        return None
-    return (mode, _head(path, HEAD_SIZE)) if stat.S_ISREG(mode) and os.access(path, os.X_OK) else None
+    return (path.stat().st_mode, _head(path, HEAD_SIZE)) if path.is_file() and os.access(path, os.X_OK) else None
 
 
 def refusal(service: str, name: str, environment: Mapping[str, str], folder: Path, look: Look = on_this_machine) -> str:
@@ -153,18 +146,13 @@ def _unreachable(mode: int, head: bytes) -> str:
         return ""
     if _machine(head) != _machine(_head(Path("/proc/self/exe"), HEAD_SIZE)):
         return "a program for another processor than DoDo's own"
-    headers = [*_headers(head)]
-    if any(kind == _NOTE and shown[12:15] == b"Go\0" for kind, shown in headers):
-        return "a program of Go, which asks the kernel itself"
-    return "" if any(kind == _INTERPRETER for kind, _ in headers) else "a statically linked program"
-
-
-def _headers(head: bytes) -> Iterator[tuple[int, bytes]]:
-    """The kinds of the program headers of a 64-bit ELF file, and the beginning of what each shows."""
-    order = "<" if head[5:6] == b"\x01" else ">"
-    with contextlib.suppress(struct.error, ValueError):
-        (offset,) = struct.unpack_from(f"{order}Q", head, 32)
-        size, count = struct.unpack_from(f"{order}HH", head, 54)
+    kinds = set()
+    with contextlib.suppress(struct.error, ValueError):  # of a 64-bit file, in this machine's byte order
+        (offset,) = struct.unpack_from("=Q", head, 32)
+        size, count = struct.unpack_from("=HH", head, 54)
         for start in range(offset, offset + size * count, size):
-            kind, place = struct.unpack_from(f"{order}I4xQ", head, start)
-            yield kind, head[place : place + 16]
+            kind, place = struct.unpack_from("=I4xQ", head, start)
+            kinds.add(kind)
+            if kind == _NOTE and head[place + 12 : place + 15] == b"Go\0":
+                return "a program of Go, which asks the kernel itself"
+    return "" if _INTERPRETER in kinds else "a statically linked program"

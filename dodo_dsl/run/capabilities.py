@@ -2,9 +2,10 @@
 
 import contextlib
 import os
+import re
 import socket
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -26,7 +27,7 @@ class Capability:
     """One thing that was examined; ``advice`` is what to do when it is not ok."""
 
     name: str
-    state: State
+    state: Literal["ok", "warning", "problem"]
     text: str
     advice: str = ""
 
@@ -39,22 +40,17 @@ def namespaces() -> Iterator[Capability]:
         yield Capability("namespaces", "ok", "each test gets its own network, IPC and /tmp, its application a sandbox")
 
 
-_CID, _RECEIVE_S = 254, 1.0
-
-
 def multicast() -> Iterator[Capability]:
     try:
-        with host_isolation.joined(_CID) as receiver, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-            receiver.settimeout(_RECEIVE_S)
-            sender.sendto(b"dodo", group(_CID))
+        with host_isolation.joined(254) as receiver, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            receiver.settimeout(1.0)
+            sender.sendto(b"dodo", group(254))
             receiver.recv(65_535)
+        yield Capability("multicast", "ok", "works on the host")
     except OSError as error:
         way = "as root: ip link set lo up multicast on && ip route replace 225.0.0.0/24 dev lo"
-        yield Capability(
-            "multicast", "problem", f"does not work on the host ({error}); 'isolation: host' needs it", way
-        )
-    else:
-        yield Capability("multicast", "ok", "works on the host")
+        text = f"does not work on the host ({error}); 'isolation: host' needs it"
+        yield Capability("multicast", "problem", text, way)
 
 
 def docker_engine() -> Iterator[Capability]:
@@ -70,16 +66,11 @@ def docker_engine() -> Iterator[Capability]:
         yield Capability("docker engine", "ok", text)
 
 
-_COMPOSE = (2, 20)
-
-
-def compose_plugin() -> Iterator[Capability]:
-    command = ["docker", "compose", "version", "--short"]
-    try:
+def compose() -> Iterator[Capability]:
+    command, text = ["docker", "compose", "version", "--short"], ""
+    with contextlib.suppress(OSError, subprocess.SubprocessError):
         text = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
-    except (OSError, subprocess.SubprocessError):
-        text = ""
-    if tuple(int(n) for n in text.lstrip("v").split("-")[0].split(".")[:2] if n.isdecimal()) >= _COMPOSE:
+    if [int(number) for number in re.findall(r"\d+", text)[:2]] >= [2, 20]:
         yield Capability("compose", "ok", f"version {text}")
         return
     found = f"version {text} is older than 2.20" if text else "'docker compose' does not run"
@@ -94,12 +85,12 @@ def emulated_rig() -> Iterator[Capability]:
     """Whether the programs are built that a gantry with ``--serial=emulated`` starts."""
     named = os.environ.get(FIRMWARE)
     places = (Path(named),) if named else EMULATOR_PLACES
-    for place in places:
-        if all((place / name).is_file() for name in ("rig-emulator", "gantry.elf")):
-            yield Capability("emulated rig", "ok", f"is built, in {place}")
-            return
-    text = f"is not built: it is not in {' or '.join(map(str, places))}; hil tests need it"
-    yield Capability("emulated rig", "warning", text, advice.FIRMWARE)
+    built = [p for p in places if all((p / name).is_file() for name in ("rig-emulator", "gantry.elf"))]
+    if built:
+        yield Capability("emulated rig", "ok", f"is built, in {built[0]}")
+    else:
+        text = f"is not built: it is not in {' or '.join(map(str, places))}; hil tests need it"
+        yield Capability("emulated rig", "warning", text, advice.FIRMWARE)
 
 
 def left_behind() -> Iterator[Capability]:
@@ -115,36 +106,20 @@ def left_behind() -> Iterator[Capability]:
 
 def rigs() -> Iterator[Capability]:
     try:
-        for rig, reason in all_quarantined().items():
-            yield Capability(
-                f"rig {rig}", "problem", f"in quarantine: {reason}", f"repair it, then dodo rig clear {rig}"
-            )
+        for rig, why in all_quarantined().items():
+            way = f"repair it, then dodo rig clear {rig}"
+            yield Capability(f"rig {rig}", "problem", f"in quarantine: {why}", way)
     except RigProblem as problem:
         yield Capability("rigs", "warning", str(problem), "tests on real rigs end in error without it")
 
 
-_CHECKS: tuple[Callable[[], Iterator[Capability]], ...] = (
-    namespaces,
-    multicast,
-    docker_engine,
-    compose_plugin,
-    left_behind,
-    rigs,
-    emulated_rig,
-)
-
-
-def examine() -> list[Capability]:
-    """All findings, in the order in which a run would need things."""
-    return [finding for check in _CHECKS for finding in _findings(check)]
-
-
-def _findings(check: Callable[[], Iterator[Capability]]) -> Iterator[Capability]:
-    """The findings of a check; a check that raises is a finding, too."""
-    try:
-        yield from check()
-    except Exception as error:  # noqa: BLE001  (a machine that lacks something is what this command is for)
-        yield Capability(check.__name__.replace("_", " "), "problem", f"cannot be examined: {error}")
+def examine() -> Iterator[Capability]:
+    """All findings, in the order in which a run would need things; a check that raises is one, too."""
+    for check in (namespaces, multicast, docker_engine, compose, left_behind, rigs, emulated_rig):
+        try:
+            yield from check()
+        except Exception as error:  # noqa: BLE001  (a machine that lacks something is what this command is for)
+            yield Capability(check.__name__.replace("_", " "), "problem", f"cannot be examined: {error}")
 
 
 def clean() -> tuple[list[str], list[str]]:

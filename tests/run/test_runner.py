@@ -135,7 +135,7 @@ def test_pictures_stay_unless_the_test_passed(scene: Scene, verdict: VerdictEven
 
 
 TOO_BUSY = (
-    "the machine was too busy to judge: app waited 0.3 s of 1.0 s for a processor, others took 90 % of it; "
+    "the machine was too busy to judge: app waited 0.3 s of 1.0 s for a processor, others took 90 % of the processor; "
     "it found: hit wall left; run it with --clock lockstep, or fewer tests at once (-j 1)"
 )
 

@@ -27,7 +27,6 @@ MOST_LATE = 0.1
 """Share of the pictures, or of a service's other updates, that may have come later than half a period."""
 LEAST_CROWDED = 0.1
 """Share of the test's time in which others must have filled the machine for lateness to be their fault."""
-_MAX_FOUND = 300
 _WAY_OUT = "run it with --clock lockstep, or fewer tests at once (-j 1)"
 
 
@@ -39,8 +38,7 @@ def consider(finding: Finding, load: MachineLoad | None) -> tuple[Finding, Machi
     """
     if load is None or finding.result != "failed" or finding.cause != "verdict" or not (why := too_busy(load)):
         return finding, load
-    found = finding.reason if len(finding.reason) <= _MAX_FOUND else f"{finding.reason[:_MAX_FOUND]}..."
-    reason = f"the machine was too busy to judge: {why}; it found: {found}; {_WAY_OUT}"
+    reason = f"the machine was too busy to judge: {why}; it found: {finding.reason}; {_WAY_OUT}"
     return replace(finding, result="error", reason=reason), replace(load, undecided=True)
 
 
@@ -51,19 +49,16 @@ def too_busy(load: MachineLoad) -> str:
     if load.application is None or load.services is None or load.crowded_s is None or load.cores is None:
         return ""
     own = load.services.ran_s / (load.cores * load.duration_s)
-    share = f"{min((load.others_share or 0.0) + own, 1.0) * 100:.0f} %"
+    others = f"others took {min((load.others_share or 0.0) + own, 1.0) * 100:.0f} % of the processor"
     wait = load.application
     if wait.displaced_s > max(MOST_WAITED * load.duration_s, LEAST_WAITED_S):
-        waited = f"{wait.displaced_s:.1f} s of {load.duration_s:.1f} s"
-        return f"{wait.longest} waited {waited} for a processor, others took {share} of it"
-    if load.crowded_s > LEAST_CROWDED * load.duration_s:
-        for late, what in (
-            (load.late_pictures_share, "the pictures"),
-            (load.late_updates_share, "the updates of one of DoDo's services"),
-        ):
-            if late > MOST_LATE:
-                found = f"{late * 100:.0f} % of {what} came late, by up to {load.lateness_s:.2f} s"
-                return f"{found}, others took {share} of the processor"
+        return f"{wait.longest} waited {wait.displaced_s:.1f} s of {load.duration_s:.1f} s for a processor, {others}"
+    late, what = max(
+        (load.late_pictures_share, "the pictures"),
+        (load.late_updates_share, "the updates of one of DoDo's services"),
+    )
+    if late > MOST_LATE and load.crowded_s > LEAST_CROWDED * load.duration_s:
+        return f"{late * 100:.0f} % of {what} came late, by up to {load.lateness_s:.2f} s, {others}"
     return ""
 
 
@@ -73,7 +68,6 @@ UNSEEN_USE = (
 )
 MOST_SLOW = 0.1
 """Share of answers that may take longer than the frames' period before a note says so."""
-_MB = 1e6
 
 
 @dataclass
@@ -117,7 +111,7 @@ class JudgedFigures:
             return
         for use in uses:
             for name, value, most, unit, words in (
-                (PEAK_MEMORY, use.peak_memory_bytes / _MB, limits.max_memory_mb, "MB", "used {:,.4g} MB of memory"),
+                (PEAK_MEMORY, use.peak_memory_bytes / 1e6, limits.max_memory_mb, "MB", "used {:,.4g} MB of memory"),
                 (PROCESSOR_TIME, use.processor_s, limits.max_processor_time_s, "s", "took {:.2f} s of processor time"),
                 (PROCESSOR_SHARE, use.processor_share, limits.max_processor_share, "", "took {:.0f} % of a processor"),
             ):

@@ -34,7 +34,7 @@ CRASHED = Finding("failed", "application service 'app' ended with exit code 3 af
 @pytest.mark.parametrize(
     ("load", "why"),
     [
-        (CROWDED, "perception waited 1.9 s of 7.5 s for a processor, others took 71 % of it"),
+        (CROWDED, "perception waited 1.9 s of 7.5 s for a processor, others took 71 % of the processor"),
         (replace(CALM, late_pictures_share=0.2), "20 % of the pictures came late, by up to 0.06 s, others took 71 %"),
         (replace(CALM, late_updates_share=0.2), "20 % of the updates of one of DoDo's services came late, by up to"),
         (replace(CALM, paused_s=0.061), "the emulated rig could not keep real time and stood still for 0.06 s; it "),
@@ -47,7 +47,7 @@ def test_a_failure_on_a_busy_machine_is_an_error(load: MachineLoad, why: str) ->
     assert (finding.result, finding.service, found) == ("error", "judge", replace(load, undecided=True))
     assert finding.reason.startswith(f"the machine was too busy to judge: {why}")
     assert "; it found: only 43 frames had an answer (at least 50); run it with --clock lockstep" in finding.reason
-    assert f"it found: {'x' * 300}...; run it" in consider(replace(FAILED, reason="x" * 2000), load)[0].reason
+
     for other in (replace(FAILED, result="passed"), replace(FAILED, result="error"), CRASHED):
         assert consider(other, load) == (other, load), "does not depend on time"
 
