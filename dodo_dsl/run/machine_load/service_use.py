@@ -93,11 +93,17 @@ class UseReader:
         self._threads = threads
 
     def _busy_s(self, cores: Collection[int]) -> float | None:
+        """Seconds for which ``cores`` were busy; None where the kernel does not say, or not who waits."""
         try:
             (self._proc / "self" / "schedstat").stat()
-            return busy_s((self._proc / "stat").read_text(), cores)
+            text = (self._proc / "stat").read_text()
         except OSError:
             return None
+        rows = {words[0]: words[1:] for words in map(str.split, text.splitlines()) if words}
+        own = [rows.get(f"cpu{core}", []) for core in cores]
+        if any(len(row) <= max(_BUSY) for row in own):
+            return None
+        return sum(int(row[column]) for row in own for column in _BUSY) / _TICKS
 
 
 def _threads(folder: Path) -> Iterable[tuple[str, tuple[int, int]]]:
@@ -107,12 +113,3 @@ def _threads(folder: Path) -> Iterable[tuple[str, tuple[int, int]]]:
             with contextlib.suppress(OSError):
                 ran, waited = map(int, (thread / "schedstat").read_bytes().split()[:2])
                 yield thread.name, (ran, waited)
-
-
-def busy_s(text: str, cores: Iterable[int]) -> float | None:
-    """Seconds for which ``cores`` were busy, by the text of ``/proc/stat``; None when it has nothing of one."""
-    rows = {words[0]: words[1:] for words in map(str.split, text.splitlines()) if words}
-    own = [rows.get(f"cpu{core}", []) for core in cores]
-    if any(len(row) <= max(_BUSY) for row in own):
-        return None
-    return sum(int(row[column]) for row in own for column in _BUSY) / _TICKS

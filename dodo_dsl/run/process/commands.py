@@ -25,8 +25,6 @@ from dodo_dsl.run.process.environment import (
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot, named_paths, package_path
 from dodo_dsl.run.rigs.ports import masked
 
-_NUL = "\0"
-
 
 @dataclass(frozen=True)
 class Commands:
@@ -110,12 +108,6 @@ class Commands:
         environment = {**_without_windows(argv, {**inherited, **own}), SLOT_VARIABLE: self.slot.name}
         if self.time is not None:
             environment = self.time.variables(environment, self.plan, service.name, self.time_folder)
-        broken = [f"variable {name.partition(_NUL)[0]}" for name, value in own.items() if _NUL in name + value]
-        if broken or _NUL in "".join(argv):
-            what = (*broken, "the command")[0]
-            raise EnvironmentProblem(
-                f"{what} of '{service.name}' holds a NUL character, which no process takes: remove it"
-            )
         hidden = tuple(masked(self.plan, None))
         return Command(service.name, "application", argv, environment, str(folder), masked=hidden)
 

@@ -1,7 +1,6 @@
 """A program of the application in its own sandbox."""
 
 import contextlib
-import errno
 import functools
 import os
 import resource
@@ -29,7 +28,11 @@ def start(
 
     ``places`` is None on the host. Raises OSError, SubprocessError and ValueError.
     """
-    program = _found(command.argv[0], command.environment, confined.folder)
+    name = command.argv[0]
+    found = shutil.which(
+        Path(confined.folder, name) if "/" in name else name, path=command.environment.get("PATH", os.defpath)
+    )
+    program = str(Path(confined.folder, found)) if found else name  # then bubblewrap says why it cannot start it
     user = places.user if places else None
     given = {**command.environment, **({"HOME": confinement.HOME} if places else {})}
     others = 0 if user is not None else _threads_of_this_user()
@@ -85,42 +88,27 @@ def _in_files(data: Mapping[str, bytes]) -> Iterator[dict[str, int]]:
         yield {name: file.fileno() for name, file in files.items()}
 
 
-def _found(name: str, environment: Mapping[str, str], folder: str) -> str:
-    """The path of a program; raises FileNotFoundError and PermissionError as starting it would."""
-    path = Path(folder, name) if "/" in name else None
-    found = shutil.which(path or name, path=environment.get("PATH", os.defpath))
-    if found is None:
-        number = errno.EACCES if path and path.exists() else errno.ENOENT
-        raise OSError(number, os.strerror(number), name)
-    return str(Path(folder, found))
-
-
 def _limit(limits: SandboxLimits, parent: int, group: ProcessGroup | None, others: int) -> None:
     """Between fork and exec. Without a group the kernel counts processes by user, ``others`` of this one among them."""
     namespaces.begin(parent)
+    kinds = {
+        resource.RLIMIT_CORE: 0,
+        resource.RLIMIT_NOFILE: limits.files,
+        resource.RLIMIT_FSIZE: limits.file_size,
+        resource.RLIMIT_DATA: 2 * limits.memory,  # what memory_watch would see too late
+    }
     if group is None or not group.join():
-        _set_limit(resource.RLIMIT_NPROC, limits.processes + process_group.OURS + 2 * others)
-    for kind, most in (
-        (resource.RLIMIT_CORE, 0),
-        (resource.RLIMIT_NOFILE, limits.files),
-        (resource.RLIMIT_FSIZE, limits.file_size),
-        (resource.RLIMIT_DATA, 2 * limits.memory),  # what memory_watch would see too late
-    ):
-        _set_limit(kind, most)
+        kinds[resource.RLIMIT_NPROC] = limits.processes + process_group.OURS + 2 * others
+    for kind, most in kinds.items():
+        _, hard = resource.getrlimit(kind)
+        allowed = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.setrlimit(kind, (allowed, allowed))
 
 
-def _set_limit(kind: int, most: int) -> None:
-    _, hard = resource.getrlimit(kind)
-    allowed = most if hard == resource.RLIM_INFINITY else min(most, hard)
-    resource.setrlimit(kind, (allowed, allowed))
-
-
-def _threads_of_this_user(proc: Path = Path("/proc")) -> int:
+def _threads_of_this_user() -> int:
     """As many as are seen: in a sandbox its own, of which alone the kernel counts there (since Linux 5.14)."""
     threads = 0
-    for entry in proc.iterdir():
-        if entry.name.isdigit():
-            with contextlib.suppress(OSError):  # it has ended meanwhile
-                if entry.stat().st_uid == os.getuid():
-                    threads += sum(1 for _ in (entry / "task").iterdir())
+    for entry in Path("/proc").glob("[0-9]*/task"):
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            threads += entry.stat().st_nlink - 2 if entry.stat().st_uid == os.getuid() else 0
     return threads

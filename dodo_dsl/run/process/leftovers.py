@@ -3,7 +3,6 @@
 import contextlib
 import os
 import re
-import select
 import shutil
 import signal
 import time
@@ -14,7 +13,7 @@ from dodo_dsl.run.process import process_group
 from dodo_dsl.run.process.slot import SLOT_VARIABLE
 
 SLOT_NAME = re.compile(r"dodo-[0-9a-f]{8}-")
-_END_S, _KILL_S = 3.0, 2.0
+_END_S, _KILL_S, _POLL_S = 3.0, 2.0, 0.05
 
 
 def reap() -> list[str]:
@@ -37,28 +36,25 @@ def remove_left(lease: leases.Lease) -> tuple[int, int]:
 
 def end_slot(slot: str) -> int:
     """Ends the processes whose environment names the slot, which may be moving a rig; returns their number."""
-    if ended := _signal_slot(slot, signal.SIGTERM, _END_S):
-        _signal_slot(slot, signal.SIGKILL, _KILL_S)
+    ended = len(running := _of_slot(slot))
+    for number, patience_s in ((signal.SIGTERM, _END_S), (signal.SIGKILL, _KILL_S)):
+        deadline = time.monotonic() + patience_s
+        for pid in running:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, number)
+        while (running := _of_slot(slot)) and time.monotonic() < deadline:
+            time.sleep(_POLL_S)
     return ended
 
 
-def _signal_slot(slot: str, number: signal.Signals, patience: float) -> int:
-    """How many processes got a signal; returns when all of them have ended, at the latest after ``patience`` in s."""
-    mark = f"{SLOT_VARIABLE}={slot}\0".encode()
-    with contextlib.ExitStack() as stack:
-        running = set()
-        for entry in Path("/proc").iterdir():
-            if entry.name.isdigit() and int(entry.name) != os.getpid():
-                with contextlib.suppress(OSError):
-                    if mark in (entry / "environ").read_bytes() + b"\0":
-                        descriptor = os.pidfd_open(int(entry.name))
-                        stack.callback(os.close, descriptor)
-                        signal.pidfd_send_signal(descriptor, number)
-                        running.add(descriptor)
-        notified, deadline = len(running), time.monotonic() + patience
-        while running and (left := deadline - time.monotonic()) > 0:
-            running -= set(select.select(running, [], [], left)[0])
-    return notified
+def _of_slot(slot: str) -> list[int]:
+    """Processes that have not ended."""
+    mark, found = f"{SLOT_VARIABLE}={slot}\0".encode(), []
+    for entry in Path("/proc").glob("[0-9]*/environ"):
+        with contextlib.suppress(OSError):
+            if mark in entry.read_bytes() + b"\0" and int(entry.parent.name) != os.getpid():
+                found.append(int(entry.parent.name))
+    return found
 
 
 def remove_memories(prefix: str) -> int:

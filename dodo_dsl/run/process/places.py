@@ -7,10 +7,10 @@ The kernel counts processes, inotify instances and bytes of message queues by us
 containers and namespaces, whose processes this one may not see. So an id is drawn from millions.
 """
 
+import contextlib
 import errno
 import os
 import secrets
-import stat
 import tempfile
 from pathlib import Path
 
@@ -19,14 +19,13 @@ from dodo_dsl.run.process import namespaces
 _MODE = 0o755
 _SYSTEM = Path("/usr")
 """What packages of the system install: everybody can read it."""
-_READABLE = stat.S_IROTH | stat.S_IXOTH
 
 
 class Places:
     """Folders that belong to ``user``, None for that of this process. To be made by a sandbox with own mounts."""
 
     def __init__(self, folder: str, user: int | None) -> None:
-        """``folder`` is the application's; raises OSError, also where its user may not read that."""
+        """``folder`` is the application's; raises OSError."""
         self.user = user
         """The user that the application runs as; None for the user of this process."""
         self._root = Path(tempfile.mkdtemp(prefix="dodo-application-", dir=namespaces.SHARED[0]))  # the sandbox's own
@@ -55,10 +54,7 @@ class Places:
     def _overlaid(self, folder: Path) -> tuple[Path, bool]:
         lower, merged = self._made("lower"), self._made("merged")
         upper, work = self._made("upper", is_own=True), self._made("work", is_own=True)
-        mode = folder.stat().st_mode
-        if not self._show(folder, lower) and self.user is not None and mode & _READABLE != _READABLE:
-            why = "readable for its owner alone, and this kernel cannot show it to the application's user"
-            raise PermissionError(errno.EACCES, why, str(folder))
+        self._show(folder, lower)
         try:
             namespaces.mount("overlay", merged, f"lowerdir={lower},upperdir={upper},workdir={work}")
         except OSError:  # as some file systems refuse: then it can only be read
@@ -76,16 +72,13 @@ class Places:
             self._read[path] = target
         return self._read[path]
 
-    def _show(self, source: Path, target: Path) -> bool:
-        """Whether it is shown as the application's own, as the kernel can do; else it is shown as it is."""
-        try:
-            if self.user is not None:
+    def _show(self, source: Path, target: Path) -> None:
+        """As the application's own, where the kernel and the file system can do that."""
+        if self.user is not None:
+            with contextlib.suppress(OSError):
                 namespaces.bind_as(source, target, source.stat().st_uid, self.user)
-                return True
-        except OSError:  # as some kernels and file systems refuse
-            pass
+                return
         namespaces.bind(source, target, deep=True)
-        return False
 
 
 OWN_USERS = (range(1_879_048_192, 2_147_483_648), range(64_000, 65_000))

@@ -122,6 +122,3 @@ def test_what_processes_share_counts_once(proc: Proc) -> None:
     proc.end(13)
     (proc.root / "12" / "smaps_rollup").unlink()
     assert proc.megabytes() == pytest.approx(50, abs=1e-5), "one has ended meanwhile"
-
-
-STAT = "cpu  9 9\ncpu0 100 20 300 9999 9999 4 5 60 8888 7777\ncpu1 1 1 1 9999 9999 1 1 1 0 0\ncpu10 7 7 7\nintr 5\n"

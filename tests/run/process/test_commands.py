@@ -1,16 +1,13 @@
 """What the process backend makes of services: their words, their variables, and where they come from."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.run.process.commands import Commands
 from dodo_dsl.run.process.confinement import Command
 from dodo_dsl.run.process.slot import Slot
 from tests.application.compiled import FILE, compiled, repository
-from tests.run import scripted
 
 COMPOSE = """\
 services:
@@ -96,14 +93,3 @@ def test_where_a_program_draws(
     made = command(tmp_path, monkeypatch)
     assert (made.argv[:2], made.environment.get("QT_QPA_PLATFORM")) == (argv, platform)
     assert "planner.py" in made.argv
-
-
-@pytest.mark.parametrize("where", ["environment", "process"])
-def test_a_nul_character_is_named_without_its_value(tmp_path: Path, where: str) -> None:
-    changed = {"environment": {"environment": {"LOG": "se\0cret"}}, "process": {"process": ("python", "se\0cret")}}
-    one = scripted.plan()
-    (app,) = one.application.services
-    app = replace(app, **changed[where])
-    what = {"environment": "variable LOG", "process": "the command"}[where]
-    with pytest.raises(EnvironmentProblem, match=f"^{what} of '{app.name}' holds a NUL character"):
-        Commands(one, tmp_path, tmp_path, Slot(150)).of(app)

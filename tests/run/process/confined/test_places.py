@@ -62,16 +62,6 @@ def test_writes_stay_apart(own: Path) -> None:
     assert (own / "data").read_text() == "as it was"
 
 
-def test_a_folder_that_its_user_could_not_read_is_an_error_and_not_the_applications_fault(
-    own: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(namespaces, "bind_as", refused)
-    said = "readable for its owner alone, and this kernel cannot show it to the application's user"
-    assert within(lambda: bool(Places(str(own), USER)), own) == [str(own), said]
-    own.chmod(0o755)
-    assert within(lambda: bool(Places(str(own), USER)), own) is True
-
-
 @pytest.mark.thorough
 def test_what_it_may_read_is_shown_as_its_own_where_the_kernel_can(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def owners() -> object:
