@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dodo_dsl import package_data
@@ -17,11 +17,9 @@ from dodo_dsl.plan.added_services import ANSWERS_VARIABLE, TIME, TIME_FOLDER
 from dodo_dsl.plan.model import DISPLAY_SERVER, ApplicationService, Flag, Plan, PlannedService
 from dodo_dsl.run.application_files import application_paths, variables_of
 from dodo_dsl.run.application_time import ApplicationTime, folder_of
-from dodo_dsl.run.process.confinement import Command
-from dodo_dsl.run.process.environment import (
-    application_environment,
-    base_environment,
-)
+from dodo_dsl.run.hidden_paths import hidden_paths, own_data
+from dodo_dsl.run.process.confinement import Command, Confinement, readable
+from dodo_dsl.run.process.environment import application_environment, base_environment
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot, named_paths, package_path
 from dodo_dsl.run.rigs.ports import masked
 
@@ -34,6 +32,9 @@ class Commands:
     folder: Path
     report: Path
     slot: Slot
+    is_on_host: bool = False
+    is_apart: bool = True
+    """Whether the application has its own processes, where it is on the host."""
     time: ApplicationTime | None = None
     """What gives the application the test's time, where it runs here."""
     by_answers: bool = False
@@ -56,8 +57,11 @@ class Commands:
             **({ANSWERS_VARIABLE: "1"} if self.by_answers else {}),
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
-        hidden = tuple(masked(self.plan, service))
+        hidden = self._masked(service)
         return Command(service.name, service.layer, words, environment, str(self.folder), is_module, hidden)
+
+    def _masked(self, service: PlannedService | None) -> tuple[str, ...]:
+        return tuple(masked(self.plan, service)) if self.is_on_host and self.is_apart else ()
 
     def _flag(self, flag: Flag) -> str:
         values: dict[str, Callable[[], str]] = {
@@ -74,9 +78,9 @@ class Commands:
     def time_folder(self) -> str:
         return folder_of(self.slot.name)
 
-    def of_time(self, on_host: bool) -> Command:
+    def of_time(self) -> Command:
         assert self.time is not None
-        words = self.time.words(self.plan, self.time_folder, on_host=on_host)
+        words = self.time.words(self.plan, self.time_folder, on_host=self.is_on_host)
         environment = {**base_environment(self.plan.application.access.passed), SLOT_VARIABLE: self.slot.name}
         return Command(TIME, "environment", words, environment, str(self.folder))
 
@@ -108,8 +112,34 @@ class Commands:
         environment = {**_without_windows(argv, {**inherited, **own}), SLOT_VARIABLE: self.slot.name}
         if self.time is not None:
             environment = self.time.variables(environment, self.plan, service.name, self.time_folder)
-        hidden = tuple(masked(self.plan, None))
-        return Command(service.name, "application", argv, environment, str(folder), masked=hidden)
+        confined = self._confined(service.name, folder) if self.is_confined else None
+        hidden = self._masked(None)
+        return Command(service.name, "application", argv, environment, str(folder), masked=hidden, confined=confined)
+
+    @property
+    def is_confined(self) -> bool:
+        return not self.is_on_host or self.is_apart
+
+    def _confined(self, name: str, folder: Path) -> Confinement:
+        """How a process of the application is kept apart."""
+        limits = self.plan.application.limits
+        more = [*([self.time.library] if self.time else []), *([package_data.services()] if name == BRIDGE else [])]
+        processes = limits.processes * len(self.plan.application.services)  # of one user, as they count
+        return Confinement(
+            str(folder),
+            readable(folder, limits, *more),
+            () if self.is_on_host else self._hidden(),
+            replace(limits, processes=processes),
+            channels=str(Path(self.slot.channel).parent) if self.is_on_host else "",
+            time=self.time_folder if self.time else "",
+        )
+
+    def _hidden(self) -> tuple[str, ...]:
+        """What an application never sees, and what lies around its folder: its repository, the test's folders."""
+        known = hidden_paths(self.plan.application, self.folder, self.report)
+        roots = application_paths(self.plan.application, self.folder).roots
+        places = (path.resolve() for path in (self.folder, self.report, Path(self.slot.channel).parent))
+        return tuple(dict.fromkeys(map(str, (*known, *own_data(), *roots, *places))))
 
 
 def _without_windows(argv: Sequence[str], environment: dict[str, str]) -> dict[str, str]:

@@ -2,33 +2,36 @@
 
 import asyncio
 import contextlib
-import functools
+import json
 import os
+import select
+import signal
+import socket
+import struct
 import subprocess
+import sys
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from dodo_dsl import atomic, package_data
+from dodo_dsl import atomic
 from dodo_dsl.application.interpolation import EnvironmentProblem
-from dodo_dsl.application.ros_topics import BRIDGE
 from dodo_dsl.opendlv.relay import BUS
 from dodo_dsl.plan.added_services import TIME
 from dodo_dsl.plan.model import HEALTHY, LAYERS, STARTED, Plan
 from dodo_dsl.run import application_time
-from dodo_dsl.run.application_files import application_paths
-from dodo_dsl.run.hidden_paths import hidden_paths, own_data
 from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import Send
 from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.commands import Commands, needed_paths, own_modules
-from dodo_dsl.run.process.confinement import Command, Confinement, readable
+from dodo_dsl.run.process.confinement import Command
+from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server import ForkServer
-from dodo_dsl.run.process.sandbox_client import SandboxClient
-from dodo_dsl.run.process.slot import Entered, Slot
+from dodo_dsl.run.process.sandbox import MAX_MESSAGE
+from dodo_dsl.run.process.slot import SLOT_VARIABLE, Entered, Slot, package_path
 from dodo_dsl.run.protocol import BackendError, Ready, Say
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.sides import APPLICATION, Side, WatchedServices
@@ -37,6 +40,8 @@ LOG = "sandbox.log"
 _TIME_READY = b'{"dodo": "ready"}'
 """What gives the application the test's time prints when it does."""
 USE_PATIENCE_S, CONNECT_PATIENCE_S = 2.0, 30.0
+SEND_S, END_S = 10, 10.0
+"""How long a sandbox may take for a message, and to end."""
 _OUTPUT_S = 1.0
 _COPY = ("cat",)
 """What goes on writing the log of a service that is kept."""
@@ -116,13 +121,18 @@ class ProcessSide:
         self._watched = watched
         self._plan, self._folder, self._report = watched.plan, watched.folder, watched.report
         self._slot = slot
-        self._fork_server, self._is_on_host, self._is_apart = fork_server, fork_server is None, is_apart
+        self._fork_server, self._is_on_host = fork_server, fork_server is None
         self._gives_time, self._has_time = is_whole and self._plan.lockstep is not None, False
-        self._commands = Commands(self._plan, self._folder, self._report, slot)
+        self._commands = Commands(self._plan, self._folder, self._report, slot, self._is_on_host, is_apart)
         self._exits: list[asyncio.Future[None]] = []
         self._asked: dict[str, asyncio.Future[Any]] = {}
         """What the sandbox is to answer, by what it is asked to do."""
-        self._sandbox = SandboxClient(self._take, watched.lose)
+        self._pid = 0
+        """The sandbox's process while it runs, and a descriptor that tells its end."""
+        self._end = -1
+        self._child: subprocess.Popen[bytes] | None = None
+        self._socket: socket.socket | None = None
+        self._closing = False
 
     async def open(self, entered: int = 0) -> int:
         needed = [*needed_paths(self._plan, self._folder, self._report), Path(self._slot.channel)]
@@ -130,10 +140,60 @@ class ProcessSide:
             needed += await self._open_time()
         self._commands = replace(self._commands, by_answers=self._watched.by_answers)
         namespaces, modules = Entered.with_own(entered, *needed), own_modules([self._plan])
-        with atomic.appended(self._report / LOG) as log:
-            await self._sandbox.open(self._slot, log.fileno(), self._fork_server, namespaces, modules)
+        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", SEND_S, 0))  # it may be busy
+        with theirs, atomic.appended(self._report / LOG) as log:
+            if self._fork_server is not None:
+                self._fork_server.fork(namespaces, modules, [theirs.fileno(), log.fileno(), *self._slot.descriptors])
+            else:
+                self._child = subprocess.Popen(
+                    [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox", str(theirs.fileno())],
+                    pass_fds=(theirs.fileno(), *self._slot.descriptors),
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=log,
+                    start_new_session=True,
+                    env={**own_environment(), "PYTHONPATH": package_path(), SLOT_VARIABLE: self._slot.name},
+                )
+        loop = asyncio.get_running_loop()
+        self._socket.setblocking(False)
+        said = await loop.sock_recv(self._socket, MAX_MESSAGE)
+        self._socket.setblocking(True)
+        answer: dict[str, Any] = json.loads(said) if said else {"down": "it ended at once"}
+        if "up" not in answer:
+            raise BackendError(f"the test's sandbox does not start: {answer['down']}")
+        loop.add_reader(self._socket, self._receive)
+        self._pid = answer["up"]
+        with contextlib.suppress(ProcessLookupError):
+            self._end = os.pidfd_open(self._pid)
         self._watched.reports.listen(Path(self._slot.channel))
         return 0
+
+    def _receive(self) -> None:
+        assert self._socket is not None
+        data = b""
+        try:
+            data = self._socket.recv(MAX_MESSAGE, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return
+        except OSError:
+            pass
+        if data:
+            self._take(json.loads(data))
+            return
+        asyncio.get_running_loop().remove_reader(self._socket)
+        self._pid = 0
+        if not self._closing:
+            self._watched.lose("the test's sandbox ended unexpectedly")
+
+    def _tell(self, do: str, *descriptors: int, **words: object) -> None:
+        """Sends the sandbox a message."""
+        assert self._socket is not None
+        try:
+            socket.send_fds(self._socket, [json.dumps({"do": do, **words}).encode()], descriptors)
+        except OSError as error:
+            why = f"it has read nothing for {SEND_S} s" if isinstance(error, BlockingIOError) else error.strerror
+            self._watched.lose(f"the test's sandbox cannot be reached: {why}")
 
     def _take(self, message: dict[str, Any]) -> None:
         if name := message.get("started"):
@@ -169,7 +229,7 @@ class ProcessSide:
     async def start(self, layer: str) -> dict[str, bool]:
         commands = {}
         if self._gives_time and layer == LAYERS[0]:
-            commands[TIME] = self._commands.of_time(self._is_on_host)
+            commands[TIME] = self._commands.of_time()
         for service in self._watched.of(layer):
             try:
                 commands[service.name] = self._commands.of(service)
@@ -195,7 +255,7 @@ class ProcessSide:
 
     def _require_loadable(self) -> None:
         """Raises BackendError where a program of the application cannot load DoDo's library."""
-        if not self._is_confined:
+        if not self._commands.is_confined:
             raise BackendError("process namespaces are refused by this machine: dodo doctor says why")
         for service in self._plan.application.services:
             with contextlib.suppress(EnvironmentProblem, IndexError):  # it is reported when the service is started
@@ -218,7 +278,7 @@ class ProcessSide:
         return self._send
 
     def _send(self, data: bytes, to: Sequence[str] = (BUS,)) -> None:
-        self._sandbox.send({"do": "send", "to": to, "data": data.hex()})
+        self._tell("send", to=to, data=data.hex())
 
     def _start(self, command: Command) -> None:
         try:
@@ -226,8 +286,10 @@ class ProcessSide:
         except OSError as error:
             self._watched.not_started(command.name, f"no pseudo terminal is available: {error.strerror}")
             return
-        hidden = command.masked if self._is_on_host and self._is_apart else ()
-        self._sandbox.start(replace(command, masked=hidden, confined=self._confined(command)), output.writer)
+        with os.fdopen(os.memfd_create("command"), "wb") as file:  # words and variables may be longer than a message
+            file.write(json.dumps(asdict(command)).encode())
+            file.flush()
+            self._tell("start", output.writer, file.fileno())
         output.release_writer()
 
     def _output(self, command: Command) -> ServiceOutput:
@@ -236,35 +298,6 @@ class ProcessSide:
             return self._watched.output(command.layer, command.name, terminal=True)
         take = self._take_of_time if command.name == TIME else None
         return self._watched.output(command.layer, command.name, take)
-
-    @property
-    def _is_confined(self) -> bool:
-        return not self._is_on_host or self._is_apart
-
-    def _confined(self, command: Command) -> Confinement | None:
-        """How an application's process is kept apart; None for DoDo's own services."""
-        if command.layer != APPLICATION or not self._is_confined:
-            return None
-        application, time = self._plan.application, self._commands.time
-        limits = application.limits
-        more = [*([time.library] if time else []), *([package_data.services()] if command.name == BRIDGE else [])]
-        return Confinement(
-            command.folder,
-            readable(Path(command.folder), limits, *more),
-            () if self._is_on_host else self._hidden,
-            replace(limits, processes=limits.processes * len(application.services)),  # of one user, as they count
-            channels=str(Path(self._slot.channel).parent) if self._is_on_host else "",
-            time=self._commands.time_folder if self._gives_time else "",
-        )
-
-    @functools.cached_property
-    def _hidden(self) -> tuple[str, ...]:
-        """What it never sees, and what lies around its folder: its repository, the folders of this test."""
-        application = self._plan.application
-        known = hidden_paths(application, self._folder, self._report)
-        roots = application_paths(application, self._folder).roots
-        places = (self._folder, self._report, Path(self._slot.channel).parent)
-        return tuple(dict.fromkeys(map(str, (*known, *own_data(), *roots, *(place.resolve() for place in places)))))
 
     async def listeners(self) -> Collection[str] | None:
         """As the sandbox sees them; None when it does not answer."""
@@ -280,7 +313,7 @@ class ProcessSide:
         """What the sandbox answers; None when it does not."""
         if what not in self._asked:
             self._asked[what] = asyncio.get_running_loop().create_future()
-            self._sandbox.send({"do": what, **words})
+            self._tell(what, **words)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(patience_s):  # wait_for of Python 3.11 may miss that it is cancelled
                 return await asyncio.shield(self._asked[what])
@@ -288,24 +321,46 @@ class ProcessSide:
 
     async def application(self) -> Collection[int] | None:
         """The sandbox, which DoDo's own services descend from, too; nothing leaves its process namespace."""
-        return [self._sandbox.pid] if self._sandbox.pid and self._is_confined else None
+        return [self._pid] if self._pid and self._commands.is_confined else None
 
     async def close(self, keep: bool) -> list[str]:
-        if keep and (pid := self._sandbox.pid):
-            return self._kept(pid)
-        await self._sandbox.close()
+        self._closing = True
+        if keep and self._pid:
+            return self._kept(self._pid)
+        if self._socket is not None:
+            await self._end_sandbox(self._socket)
         await asyncio.gather(*self._exits, return_exceptions=True)
         log = self._report / LOG
         if log.is_file() and log.stat().st_size == 0:
             log.unlink(missing_ok=True)
         return []
 
+    async def _end_sandbox(self, channel: socket.socket) -> None:
+        """With everything in it."""
+        if self._end >= 0:
+            self._tell("close")
+            await asyncio.to_thread(self._wait)
+            with contextlib.suppress(OSError):
+                while data := channel.recv(MAX_MESSAGE, socket.MSG_DONTWAIT):  # how the last of them ended
+                    self._take(json.loads(data))
+        asyncio.get_running_loop().remove_reader(channel)
+        channel.close()
+
+    def _wait(self) -> None:
+        """Returns when the sandbox has ended, which is killed where it does not end by itself."""
+        if not select.select([self._end], [], [], END_S)[0]:
+            signal.pidfd_send_signal(self._end, signal.SIGKILL)
+            select.select([self._end], [], [])
+        os.close(self._end)
+        if self._child is not None:
+            self._child.wait()
+
     def _kept(self, pid: int) -> list[str]:
         running = [name for name, output in self._watched.outputs.items() if not output.done.is_set()]
         for reader, log in (self._watched.outputs.pop(name).hand_over() for name in running):
             os.set_blocking(reader, True)
             subprocess.Popen(_COPY, stdin=reader, stdout=log, stderr=subprocess.DEVNULL, start_new_session=True)
-        self._sandbox.keep()
+        self._tell("keep")
         look = f"ps -f --ppid {pid}"
         if not self._is_on_host:
             user = "" if os.getuid() == 0 else "-U --preserve-credentials "
