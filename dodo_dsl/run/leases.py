@@ -147,17 +147,16 @@ async def lease_any(
     Raises LeaseTimeout when one holder has kept it for ``patience_s``. Times are of the event loop's clock, in s.
     """
     now = asyncio.get_running_loop().time
-    deadline, held_by, is_told = now() + patience_s, "", False
+    deadline, held_by = 0.0, ""
     while (lease := next((found for name in names if (found := attempt(name, about, shared))), None)) is None:
         holds = holder(names[0]) or "another process"
+        if not held_by:
+            waiting(f"waiting for {holds}")
         if holds != held_by:
             deadline, held_by = now() + patience_s, holds
         if now() > deadline:
             kind = names[0].partition("-")[0]
             raise LeaseTimeout(f"no {kind} came free within {patience_s:g} s; {holds} holds one")
-        if not is_told:
-            waiting(f"waiting for {holds}")
-            is_told = True
         await asyncio.sleep(_RETRY_S)
     return lease
 
@@ -166,8 +165,6 @@ def orphans(prefix: str) -> Iterator[Lease]:
     """This user's leases whose holders have ended and may have left something; each is yielded held."""
     for path in sorted(lease_folder().glob(f"{prefix}*{_ENDING}")):
         with contextlib.suppress(OSError):
-            descriptor = _locked(path, fcntl.LOCK_EX, is_made=False)
-            if descriptor is not None and os.fstat(descriptor).st_uid == os.getuid():
+            own = path.lstat().st_uid == os.getuid()
+            if own and (descriptor := _locked(path, fcntl.LOCK_EX, is_made=False)) is not None:
                 yield Lease(path.name.removesuffix(_ENDING), descriptor, path, _said(descriptor))
-            elif descriptor is not None:
-                os.close(descriptor)

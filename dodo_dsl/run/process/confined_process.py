@@ -6,13 +6,13 @@ import os
 import resource
 import shutil
 import subprocess
-from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from dodo_dsl.run.process import confinement, namespaces, process_group, seccomp_filter
 from dodo_dsl.run.process.confinement import PROGRAM, Command, Confinement
 from dodo_dsl.run.process.places import Places
 from dodo_dsl.run.process.process_group import ProcessGroup
+from dodo_dsl.run.process.slot import in_memory
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _SIGNALLED = range(129, 129 + 64)
@@ -37,18 +37,19 @@ def start(
     given = {**command.environment, **({"HOME": confinement.HOME} if places else {})}
     others = 0 if user is not None else _threads_of_this_user()
     sandbox = confinement.sandbox_words(confined, places, program, given, command.masked)
-    filtered = {"--seccomp": seccomp_filter.program()} if places else {}
     group = process_group.make(confined.limits.processes)
     said, status = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     try:
-        with _in_files(filtered) as passed, os.fdopen(status, "wb"):
-            passed["--json-status-fd"] = status
+        with contextlib.ExitStack() as stack:
+            passed = {"--json-status-fd": stack.enter_context(os.fdopen(status, "wb")).fileno()}
+            if places:
+                passed["--seccomp"] = stack.enter_context(in_memory(seccomp_filter.program())).fileno()
             if places and places.namespace is not None:  # which bubblewrap closes as it closes what it waited for
                 passed |= {"--userns": places.namespace, "--block-fd": places.namespace}
             sandbox += [word for name, descriptor in passed.items() for word in (name, str(descriptor))]
-            with _in_files({"--args": confinement.as_data(sandbox)}) as files:
+            with in_memory(confinement.as_data(sandbox)) as words:
                 process = subprocess.Popen(
-                    [PROGRAM, "--args", str(files["--args"]), "--", program, *command.argv[1:]],
+                    [PROGRAM, "--args", str(words.fileno()), "--", program, *command.argv[1:]],
                     env={"PATH": os.environ.get("PATH", os.defpath)},
                     cwd="/",
                     stdin=subprocess.DEVNULL,
@@ -59,7 +60,7 @@ def start(
                     user=user,
                     group=user,
                     extra_groups=None if user is None else [],
-                    pass_fds=(*passed.values(), *files.values()),
+                    pass_fds=(*passed.values(), words.fileno()),
                     preexec_fn=functools.partial(_limit, confined.limits, os.getpid(), group, others),  # noqa: PLW1509
                 )
     except BaseException:
@@ -75,17 +76,6 @@ def ended(said: int, code: int) -> tuple[int, bool]:
     with os.fdopen(said, "rb") as file:
         began = _BEGAN in (file.read() or b"")  # None if what it was to start has not ended yet
     return 128 - code if code in _SIGNALLED else code, code > 0 and not began
-
-
-@contextlib.contextmanager
-def _in_files(data: Mapping[str, bytes]) -> Iterator[dict[str, int]]:
-    """Descriptors of files with data, which have no names and are there to be read from their beginning."""
-    with contextlib.ExitStack() as stack:
-        files = {name: stack.enter_context(os.fdopen(os.memfd_create(name), "w+b")) for name in data}
-        for name, file in files.items():
-            file.write(data[name])
-            file.seek(0)
-        yield {name: file.fileno() for name, file in files.items()}
 
 
 def _limit(limits: SandboxLimits, parent: int, group: ProcessGroup | None, others: int) -> None:

@@ -19,8 +19,6 @@ from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.spec.deployment import RESERVED_CIDS
 
-PROBE_S = 0.3
-
 
 def isolation_refusal(on_host: bool = False) -> str:
     """Why applications cannot have their own namespaces, on the host that of processes alone; empty when they can."""
@@ -96,11 +94,11 @@ def joined(cid: int) -> Iterator[socket.socket]:
         yield receiver
 
 
-def listen(cid: int, seconds: float = PROBE_S) -> str:
-    """The address of the first sender on a CID's group within ``seconds``; empty when nobody sends."""
+def listen(cid: int) -> str:
+    """The address of the first sender on a CID's group within 0.3 s; empty when nobody sends."""
     try:
         with joined(cid) as receiver:
-            receiver.settimeout(seconds)
+            receiver.settimeout(0.3)
             _, (address, port) = receiver.recvfrom(65_535)
             return f"{address}:{port}"
     except TimeoutError:

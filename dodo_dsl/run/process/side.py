@@ -31,7 +31,7 @@ from dodo_dsl.run.process.confinement import Command
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server import ForkServer
 from dodo_dsl.run.process.sandbox import MAX_MESSAGE
-from dodo_dsl.run.process.slot import SLOT_VARIABLE, Entered, Slot, package_path
+from dodo_dsl.run.process.slot import SLOT_VARIABLE, Entered, Slot, in_memory, package_path
 from dodo_dsl.run.protocol import BackendError, Ready, Say
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.sides import APPLICATION, Side, WatchedServices
@@ -286,9 +286,7 @@ class ProcessSide:
         except OSError as error:
             self._watched.not_started(command.name, f"no pseudo terminal is available: {error.strerror}")
             return
-        with os.fdopen(os.memfd_create("command"), "wb") as file:  # words and variables may be longer than a message
-            file.write(json.dumps(asdict(command)).encode())
-            file.flush()
+        with in_memory(json.dumps(asdict(command)).encode()) as file:  # which may be longer than a message
             self._tell("start", output.writer, file.fileno())
         output.release_writer()
 

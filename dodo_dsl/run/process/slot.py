@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import BinaryIO, Self
 
 from dodo_dsl import package_data
 from dodo_dsl.run.process import namespaces
@@ -53,6 +53,14 @@ class Entered:
         return cls(
             process, tuple(sorted({path for line in lines for path in line if path.parent in namespaces.SHARED}))
         )
+
+
+def in_memory(data: bytes) -> BinaryIO:
+    """A file without a name, to be read from its beginning."""
+    file = os.fdopen(os.memfd_create("dodo"), "w+b")
+    file.write(data)
+    file.seek(0)
+    return file
 
 
 def named_paths(words: Iterable[str]) -> list[Path]:
