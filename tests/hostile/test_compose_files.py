@@ -3,17 +3,20 @@
 import asyncio
 import json
 import pwd
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from dodo_dsl.plan.model import LAYERS
 from dodo_dsl.run.docker.compose import Compose
 from tests.application.compiled import FILE, Compiled, compiled, filled, repository
 from tests.emit.readers import compose
-from tests.hostile.harmless import harm, is_harmless
+from tests.hostile.harmless import KEYS, harm, is_harmless
 
 TABLE: dict[str, dict[str, dict[str, Any]]] = yaml.safe_load((Path(__file__).parent / "compose_files.yml").read_text())
 SECRET = "s3cr3t"
@@ -38,7 +41,10 @@ def attacked(attack: dict[str, Any], folder: Path, **deployment: Any) -> tuple[C
     return compiled(root, text, **deployment), root
 
 
-@pytest.mark.parametrize("attack", attacks("refused", "left out", "secrets", "removed", "cut", "at run time", "odd"))
+GROUPS = ("refused", "left out", "secrets", "removed", "cut", "at run time", "odd")
+
+
+@pytest.mark.parametrize("attack", attacks(*GROUPS))
 def test_it_is_refused_or_harmless(attack: dict[str, Any], tmp_path: Path) -> None:
     """A file that asks for the host, other tests or secrets is refused, or its test has nothing of it."""
     test, root = attacked(attack, tmp_path, environment=list(attack.get("set", {})))
@@ -47,6 +53,38 @@ def test_it_is_refused_or_harmless(attack: dict[str, Any], tmp_path: Path) -> No
         return
     assert list(harm(test.document, root)) == []
     assert [word for word in (SECRET, *attack.get("gone", ())) if word in "".join(test.files.values())] == []
+
+
+WORDS = st.sampled_from(
+    ["", "host", "b", "1", "64g", "-1", "/", "..", "~", "/dev/sda:/d", "vol:/v", "${A:-/}", "$$A", "A=1"]
+)
+ANY = st.recursive(
+    st.none() | st.booleans() | st.integers(-2, 1 << 40) | st.floats(allow_nan=False, allow_infinity=False) | WORDS,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(WORDS, inner, max_size=3),
+    max_leaves=6,
+)
+ROWS = [attack for group in GROUPS for attack in TABLE[group].values()]
+
+
+@pytest.mark.slow
+@settings(suppress_health_check=[*HealthCheck], deadline=None, max_examples=100)
+@given(
+    st.lists(st.sampled_from(ROWS), max_size=4), st.dictionaries(st.sampled_from(sorted(KEYS | {"x"})), ANY, max_size=2)
+)
+def test_whatever_it_says(rows: list[dict[str, Any]], odd: dict[str, Any]) -> None:
+    """Several attacks together, and keys with any values."""
+    together: dict[str, Any] = {"service": {}, "file": {}, "files": {}, "links": {}}
+    for row in rows:
+        for part, joined in together.items():
+            for key, value in row.get(part, {}).items():
+                before = joined.get(key)
+                joined[key] = [*before, *value] if isinstance(value, list) and isinstance(before, list) else value
+    together["service"] |= odd
+    with tempfile.TemporaryDirectory() as folder:
+        test, root = attacked(together, Path(folder))
+        if not test.errors:
+            assert list(harm(test.document, root)) == []
+            yaml.safe_load(test.files["application.compose.yml"])
 
 
 @pytest.mark.parametrize("home", ["/", ""])

@@ -54,7 +54,7 @@ REFUSED = [
     (parameter("boolean"), "yes", "wrong-type"),
     (parameter("memory"), "a/b", "wrong-value"),
     (parameter("message"), "a.", "wrong-value"),
-    (parameter("output"), "a/b", "path-escape"),
+    *((parameter("output"), name, "path-escape") for name in ("a/b", "../a.rec", "/etc/cron.d/a", ".bashrc", "''")),
     (parameter("list", of="integer"), "[0, 1.5]", "wrong-type"),
     (parameter("list", of="number", unit="m"), "[1 m, 2]", "wrong-unit"),
     (parameter("list", of="number", unit="m", maximum=1), "[1 m, 2 m]", "out-of-range"),

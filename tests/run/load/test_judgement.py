@@ -80,9 +80,7 @@ COPIED = replace(PLAIN, is_copied=True)
 @pytest.mark.parametrize(
     ("response", "lockstep", "note"),
     [
-        (None, PLAIN, ""),
         (None, LIMITED, UNMEASURED),
-        (FAST, None, ""),
         (FAST, PLAIN, ""),
         (replace(FAST, slow=6, worst_s=1.0), PLAIN, ""),
         (

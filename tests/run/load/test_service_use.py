@@ -74,9 +74,7 @@ def test_all_processes_of_a_service_add_up(proc: Proc) -> None:
 def test_a_process_that_was_waited_for_counts_once(proc: Proc) -> None:
     """Whether or not its parent has already been told its time."""
     proc.put(10, 1, 100)
-    proc.put(11, 10, 50)
-    assert proc.ticks(app=10) == {"app": 150}
-    proc.put(11, 10, 60, state="Z")
+    proc.put(11, 10, 60)
     assert proc.ticks(app=10) == {"app": 160}
     proc.end(11)
     proc.put(10, 1, 160)
