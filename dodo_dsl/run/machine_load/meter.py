@@ -2,8 +2,8 @@
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Collection
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Awaitable, Callable, Collection, Mapping
 
 from dodo_dsl.outcome import MachineLoad, ServiceUse, Wait
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
@@ -16,14 +16,6 @@ FULL = 0.8
 """Share of the cores from which on the machine is full: rows of ticks of 10 ms are no more precise."""
 OTHERS = 0.5
 """Share of the time on processors with which others than the application take most of the machine."""
-
-
-@dataclass
-class _Service:
-    first: Used
-    last: Used
-    peak: int = 0
-    displaced_s: float = 0.0
 
 
 class Meter:
@@ -44,12 +36,14 @@ class Meter:
         self._times: list[float] = []
         """Those of the test at the first and the last look."""
         self._task: asyncio.Task[None] | None = None
-        self._services: dict[str, _Service] = {}
         self._first: Snapshot | None = None
         self._window: Snapshot | None = None
         """The first of those that are not judged yet."""
         self._last: Snapshot | None = None
+        self._used: dict[str, Used] = {}
+        """Of each service, with the most memory that it used."""
         self._crowded_s = 0.0
+        self._displaced_s = defaultdict[str, float](float)
 
     def begin(self) -> None:
         self._task = asyncio.ensure_future(self._run())
@@ -78,9 +72,7 @@ class Meter:
         """What services have used up to a time."""
         self._times = [*self._times[:1], self._test_s()]
         for name, used in snapshot.services.items():
-            service = self._services.setdefault(name, _Service(Used() if self._first else used, used))
-            service.last = used
-            service.peak = max(service.peak, used.memory)
+            self._used[name] = used._replace(memory=max(used.memory, self._used.get(name, used).memory))
         self._first, self._last = self._first or snapshot, snapshot
         self._window = self._window or snapshot
         if snapshot.at_s - self._window.at_s >= WINDOW_S:
@@ -96,12 +88,12 @@ class Meter:
         if before.busy_s is None or after.busy_s is None:
             return
         took_s, busy_s = after.at_s - before.at_s, after.busy_s - before.busy_s
-        spent = {name: _spent(before.services.get(name, Used()), used) for name, used in after.services.items()}
+        spent = {name: _since(before, name, used) for name, used in after.services.items()}
         own_s = sum(ran_s for name, (ran_s, _) in spent.items() if self._is_application(name))
         if took_s > 0 and busy_s >= FULL * after.cores * took_s and busy_s - own_s >= OTHERS * busy_s:
             self._crowded_s += took_s
             for name, (_, waited_s) in spent.items():
-                self._services[name].displaced_s += waited_s
+                self._displaced_s[name] += waited_s
 
     def load(self) -> MachineLoad | None:
         """The load between the first and the last snapshot; None if it was not measured."""
@@ -111,37 +103,33 @@ class Meter:
         if self._window and self._window.at_s < last.at_s:
             self._judge(self._window, last)
         took_s = last.at_s - first.at_s
-        own_s = sum(_spent(service.first, service.last)[0] for service in self._services.values())
-        return MachineLoad(
-            duration_s=took_s,
-            cores=last.cores,
-            application=self._longest(True, took_s),
-            services=self._longest(False, took_s),
-            others_share=max(last.busy_s - first.busy_s - own_s, 0.0) / (last.cores * took_s),
-            crowded_s=self._crowded_s,
+        spent = {name: _since(first, name, used) for name, used in self._used.items()}
+        application, services = (
+            self._longest({n: each for n, each in spent.items() if self._is_application(n) == kind}, took_s)
+            for kind in (True, False)
         )
+        others_s = max(last.busy_s - first.busy_s - sum(ran for ran, _ in spent.values()), 0.0)
+        return MachineLoad(took_s, last.cores, application, services, others_s / (last.cores * took_s), self._crowded_s)
 
-    def _longest(self, of_application: bool, took_s: float) -> Wait:
+    def _longest(self, spent: Mapping[str, tuple[float, float]], took_s: float) -> Wait:
         """What some services ran together, and the wait of the one of them that others kept waiting the longest.
 
         The kernel counts a wait when it is over, so those of several threads can overlap; none is longer than the test.
         """
-        services = {n: each for n, each in self._services.items() if self._is_application(n) == of_application}
-        spent = {name: _spent(service.first, service.last) for name, service in services.items()}
-        name = max(spent, key=lambda n: (services[n].displaced_s, spent[n][1]), default="")
-        waited_s, displaced_s = (spent[name][1], services[name].displaced_s) if spent else (0.0, 0.0)
-        return Wait(sum(ran for ran, _ in spent.values()), min(waited_s, took_s), min(displaced_s, took_s), name)
+        name = max(spent, key=lambda n: (self._displaced_s[n], spent[n][1]), default="")
+        waited_s = min(spent.get(name, (0.0, 0.0))[1], took_s)
+        return Wait(sum(ran for ran, _ in spent.values()), waited_s, min(self._displaced_s[name], took_s), name)
 
     def figures(self, names: Collection[str]) -> tuple[ServiceUse, ...]:
         passed_s, found = self._times[-1] - self._times[0] if self._times else 0.0, []
-        for name in sorted({*names} & self._services.keys()):
-            service = self._services[name]
-            ran_s, _ = _spent(service.first, service.last)
+        for name in sorted({*names} & self._used.keys()):
+            ran_s, _ = _since(self._first, name, self._used[name])
             share = ran_s / passed_s if passed_s > 0 else None
-            found.append(ServiceUse(name, ran_s, share, service.peak))
+            found.append(ServiceUse(name, ran_s, share, self._used[name].memory))
         return tuple(found)
 
 
-def _spent(then: Used, now: Used) -> tuple[float, float]:
-    """What a service ran and waited between two snapshots."""
+def _since(before: Snapshot | None, name: str, now: Used) -> tuple[float, float]:
+    """What a service ran and waited since a snapshot."""
+    then = before.services.get(name, Used()) if before else now
     return max(now.processor_s - then.processor_s, 0.0), max(now.waited_s - then.waited_s, 0.0)
