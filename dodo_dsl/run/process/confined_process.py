@@ -1,6 +1,7 @@
 """A program of the application in its own sandbox."""
 
 import contextlib
+import errno
 import functools
 import os
 import resource
@@ -28,11 +29,12 @@ def start(
 
     ``places`` is None on the host. Raises OSError, SubprocessError and ValueError.
     """
-    name = command.argv[0]
-    found = shutil.which(
-        Path(confined.folder, name) if "/" in name else name, path=command.environment.get("PATH", os.defpath)
-    )
-    program = str(Path(confined.folder, found)) if found else name  # then bubblewrap says why it cannot start it
+    name, path = command.argv[0], Path(confined.folder, command.argv[0])
+    found = shutil.which(path if "/" in name else name, path=command.environment.get("PATH", os.defpath))
+    if found is None:
+        number = errno.EACCES if "/" in name and path.exists() else errno.ENOENT
+        raise OSError(number, os.strerror(number), name)
+    program = str(Path(confined.folder, found))
     user = places.user if places else None
     given = {**command.environment, **({"HOME": confinement.HOME} if places else {})}
     others = 0 if user is not None else _threads_of_this_user()

@@ -125,7 +125,7 @@ class Sandbox:
         self.relay: Relay | None = None
         self.keep = False
         self.ended = False
-        self.wakeup, writer = os.pipe2(os.O_NONBLOCK)
+        self.wakeup, writer = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
         for number in (signal.SIGCHLD, signal.SIGTERM):
             signal.signal(number, self._on_signal)

@@ -128,7 +128,7 @@ class ProcessSide:
         self._asked: dict[str, asyncio.Future[Any]] = {}
         """What the sandbox is to answer, by what it is asked to do."""
         self._pid = 0
-        """The sandbox's process while it runs, and a descriptor that tells its end."""
+        """The sandbox's process while it runs, and a descriptor that shows its end."""
         self._end = -1
         self._child: subprocess.Popen[bytes] | None = None
         self._socket: socket.socket | None = None

@@ -50,17 +50,19 @@ def test_the_limit_holds_without_control_groups() -> None:
 
 
 @pytest.mark.slow
-def test_a_program_that_cannot_be_executed_is_an_error(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["drive", "", "gone"])
+def test_a_program_that_cannot_be_executed_is_an_error(tmp_path: Path, name: str) -> None:
     bench = Bench(tmp_path)
     program = tmp_path / "drive"
     program.write_text("#!/nowhere/python\n")
     program.chmod(0o755)
     plan = bench.plan(judge=READY + WAIT)
     (app,) = plan.application.services
-    apps = (replace(app, process=(str(program),)),)
+    started = str(tmp_path / name) if name else "no-such-program"
+    apps = (replace(app, process=(started,)),)
     (outcome,) = bench.run(replace(plan, application=replace(plan.application, services=apps)))
-    reason = f"service 'app' could not be started: {program}: No such file or directory"
-    assert (outcome.outcome, outcome.reason) == ("error", reason)
+    reason = f"service 'app' could not be started: {started}: No such file or directory"
+    assert (outcome.outcome, outcome.reason.partition(";")[0]) == ("error", reason)
 
 
 def is_empty(group: Path) -> bool:
