@@ -9,7 +9,7 @@ from typing import Annotated
 
 import msgspec
 
-from services.clock.exchange import SLICE_S, IsStopped, ServiceSilent
+from services.clock.exchange import SLICE_S, ServiceSilent
 
 PATIENCE_S = 60.0
 """Wall time in s for the agent to be there."""
@@ -63,20 +63,17 @@ class TimeAgent:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._command = self._reply = -1
-        self._text = bytearray()
-        self._lines: list[bytes] = []
+        self._text = b""
         self._poll = select.poll()
 
-    def open(self, stopped: IsStopped) -> None:
+    def open(self) -> None:
         """Wait until it is there, and hide the FIFOs from all others; raises ServiceSilent."""
         deadline = time.monotonic() + PATIENCE_S
-        while self._command < 0 and not stopped():
-            if self._is_open():
-                self._send("mine")
-            elif time.monotonic() > deadline:
+        while not self._is_open():
+            if time.monotonic() > deadline:
                 raise ServiceSilent(f"nothing in {self._folder} lets the application's time go on (dodo-time)")
-            else:
-                time.sleep(SLICE_S)
+            time.sleep(SLICE_S)
+        self._send("mine")
 
     def _is_open(self) -> bool:
         try:
@@ -94,10 +91,17 @@ class TimeAgent:
 
     def report(self, timeout: float) -> Report | None:
         """The next report, or None after ``timeout`` seconds; raises ServiceSilent."""
-        if not self._lines and self._poll.poll(timeout * 1000):
-            self._read()
+        if b"\n" not in self._text and self._poll.poll(timeout * 1000):
+            data = os.read(self._reply, _MOST_TEXT)
+            if not data:
+                raise ServiceSilent(_ENDED)
+            self._text = self._text[-_MOST_TEXT:] + data
+        line, end, rest = self._text.partition(b"\n")
+        if not end:
+            return None
+        self._text = rest
         try:
-            return _decode(self._lines.pop(0)) if self._lines else None
+            return _decode(line)
         except msgspec.DecodeError:
             return None
 
@@ -106,25 +110,15 @@ class TimeAgent:
         for descriptor in (self._command, self._reply):
             if descriptor >= 0:
                 os.close(descriptor)
-        self._command = self._reply = -1
 
     def _send(self, line: str) -> None:
         try:
             os.write(self._command, f"{line}\n".encode())
         except OSError:
-            raise ServiceSilent("what lets the application's time go on has ended (dodo-time)") from None
+            raise ServiceSilent(_ENDED) from None
 
-    def _read(self) -> None:
-        try:
-            data = os.read(self._reply, _MOST_TEXT)
-        except BlockingIOError:
-            return
-        if not data:
-            raise ServiceSilent("what lets the application's time go on has ended (dodo-time)")
-        self._text += data
-        *lines, rest = bytes(self._text).split(b"\n")
-        self._lines += lines
-        self._text = bytearray(rest if len(rest) < _MOST_TEXT else b"")
+
+_ENDED = "what lets the application's time go on has ended (dodo-time)"
 
 
 def _opened(path: Path, access: int) -> int:

@@ -2,16 +2,15 @@
 
 import time
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from dodo_dsl.opendlv.channel import Done, Show
 from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.numbers import is_whole, whole
+from dodo_dsl.opendlv.message_set import MessageSet
 from services.clock.exchange import (
     PATIENCE,
-    SLICE_S,
     WALL_FACTOR,
     ApplicationFloods,
     ApplicationSilent,
@@ -125,17 +124,9 @@ class Answers:
         return [*others, *chosen]
 
 
-def filters(names: Iterable[str], ids: Mapping[str, int]) -> tuple[MessageFilter, ...]:
-    """Messages written as ``name`` or ``name/senderStamp``; raises ValueError for an unknown name."""
-    found = []
-    for text in names:
-        name, _, stamp = text.partition("/")
-        if name not in ids or not (is_whole(stamp) or not stamp):
-            raise ValueError(
-                f"'{text}' is not a message, expected a name such as opendlv.proxy.GroundSteeringRequest/0"
-            )
-        found.append(MessageFilter(text, ids[name], whole(stamp) if stamp else None))
-    return tuple(found)
+def filters(names: Iterable[str], messages: MessageSet) -> tuple[MessageFilter, ...]:
+    """Messages written as ``name`` or ``name/senderStamp``; raises MessageError for one that is unknown."""
+    return tuple(MessageFilter(text, *messages.key(text)) for text in names)
 
 
 class AnsweringApplication:
@@ -174,55 +165,45 @@ class AnsweringApplication:
             self.answers.expect(camera.sampled for camera in shown)
         for camera in shown:
             if not camera.awaited:
-                self._link.send(camera.service, Show(awaits=True, announces=False))
-                self._await_reader(camera.service)
+                self._go(camera.service, Show(awaits=True, announces=False))
             self._link.drain()  # what the application has sent before it can see the picture
             self.answers.seen()
-            self._link.send(camera.service, Show(awaits=False, announces=True))
-            while len(shown) > 1 and self._link.result(camera.service) is None and not self._stopped():
-                self._link.pump(SLICE_S, [camera.service])  # pictures are shown in one order
+            self._go(camera.service, Show(awaits=False, announces=True))
         if not self.answers.is_expected:
             self._reading = {camera.service for camera in shown}
-            for camera in shown:
-                self._link.send(camera.service, Show(awaits=True, announces=False))
+            for name in self._reading:
+                self._link.send(name, Show(awaits=True, announces=False))
 
-    def _await_reader(self, camera: str) -> None:
+    def _go(self, camera: str, command: Show) -> None:
+        self._link.send(camera, command)
         while self._link.result(camera) is None and not self._stopped():
-            if self._left <= 0:
-                raise ApplicationSilent(self._sentence(f"no reader waited for a picture of '{camera}'"))
-            self._link.pump(SLICE_S, [camera])
+            self._pump([camera], f"no reader waited for a picture of '{camera}'")
 
     def await_answer(self, until: int) -> None:
-        """Wait for the answer to what was shown; raises ApplicationSilent and ApplicationFloods."""
-        while not (self._stopped() or not self._is_shown or self._is_answered):
-            if self._left <= 0:
-                raise ApplicationSilent(self._sentence(self._missing), silent=self.answers.is_silent)
-            self._link.pump(self._left, self._reading)
+        """Wait for the answer to what was shown; raises ApplicationSilent and ApplicationFloods.
+
+        Where no message is one, it is there when the readers wait for the next picture.
+        """
+        while self._is_shown and not self._stopped():
+            if self.answers.is_expected:
+                missing = " and ".join(name.rpartition(".")[2] for name in self.answers.missing)
+                what = f"{missing} missing" if missing else ""
+            else:
+                self._reading = {name for name in self._reading if self._link.result(name) is None}
+                what = f"no reader waited for the next picture of '{min(self._reading)}'" if self._reading else ""
+            if not what:
+                return
+            self._pump(self._reading, what, silent=self.answers.is_silent)
+
+    def _pump(self, cameras: Collection[str], what: str, *, silent: bool = False) -> None:
+        """Take a message of the bus or an answer of a camera; ``what`` is missing when the time is over."""
+        limit = self._patience.first if self.frames == 1 else WALL_FACTOR * self._patience.others
+        left = self._began + limit - time.monotonic()
+        if left <= 0:
+            raise ApplicationSilent(
+                f"the application did not answer frame {self.frames} within {limit:g} s ({what})", silent=silent
+            )
+        self._link.pump(left, cameras)
 
     def collect(self) -> list[Envelope]:
         return self.answers.collect()
-
-    @property
-    def _limit(self) -> float:
-        return self._patience.first if self.frames == 1 else WALL_FACTOR * self._patience.others
-
-    @property
-    def _left(self) -> float:
-        return self._began + self._limit - time.monotonic()
-
-    @property
-    def _is_answered(self) -> bool:
-        """Whether all answers came; where none are declared, whether the readers wait for the next picture."""
-        if self.answers.is_expected:
-            return not self.answers.missing
-        self._reading = {name for name in self._reading if self._link.result(name) is None}
-        return not self._reading
-
-    @property
-    def _missing(self) -> str:
-        if self.answers.is_expected:
-            return " and ".join(name.rpartition(".")[2] for name in self.answers.missing) + " missing"
-        return f"no reader waited for the next picture of '{min(self._reading)}'"
-
-    def _sentence(self, what: str) -> str:
-        return f"the application did not answer frame {self.frames} within {self._limit:g} s ({what})"

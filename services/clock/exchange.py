@@ -32,43 +32,36 @@ class Exchange:
         self._senders = senders or SenderTable(session.messages)
         self._listener = Listener(path, services)
         self._channels: dict[str, Channel] = {}
-        self._unsent: dict[str, Step | Show] = {}
-        self._expected: dict[str, int] = {}
-        """How many results of each service are to come, of which the last counts."""
         self._own: set[Address] = set()
 
+    def connect(self, patience: float, stopped: "IsStopped") -> None:
+        """Wait until all services are there, at most ``patience`` s of wall time; raises ServiceSilent."""
+        end = time.monotonic() + patience
+        while self._listener.missing and not stopped():
+            if accepted := self._listener.accept(SLICE_S):
+                self._channels[accepted[0]] = Channel(accepted[1])
+            elif time.monotonic() > end:
+                raise ServiceSilent(f"service '{min(self._listener.missing)}' did not connect within {patience:g} s")
+
     def send(self, service: str, command: Step | Show) -> None:
-        self._expected[service] = self._expected.get(service, 0) + 1
+        """Command a service, which answers once."""
         if service in self._channels:
             self._channels[service].send(command)
-        else:
-            self._unsent[service] = command
 
     def result(self, service: str, timeout: float = 0.0) -> Done | None:
-        """A service's answer to its last command within ``timeout`` seconds, once."""
-        if self._listener.missing:
-            self._accept(0.0 if service in self._channels else timeout)
+        """A service's answer within ``timeout`` seconds."""
         if service not in self._channels:
-            time.sleep(0.0 if self._listener.missing else timeout)
+            time.sleep(timeout)
             return None
         try:
             done = self._channels[service].receive(timeout)
         except EOFError:  # the runner says why it has ended
             del self._channels[service]
             return None
-        if not isinstance(done, Done):
-            return None
-        self._expected[service] -= 1
-        if done.about is not None:
+        assert done is None or isinstance(done, Done), "services answer"
+        if done is not None and done.about is not None:
             self._own.add(done.about.address)
-        return done if not self._expected[service] else self.result(service, timeout)
-
-    def _accept(self, timeout: float) -> None:
-        if accepted := self._listener.accept(timeout):
-            name, channel = accepted[0], Channel(accepted[1])
-            self._channels[name] = channel
-            if name in self._unsent:
-                channel.send(self._unsent.pop(name))
+        return done
 
     def pump(self, timeout: float, services: Collection[str] = ()) -> None:
         """Take the next message of the bus, unless one of the ``services`` answers before, within ``timeout`` s."""

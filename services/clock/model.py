@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 SERVICE_PATIENCE = 60.0
 """Wall time in s that a service of the test has for a step; none takes nearly as long."""
-FIRST_TIMES = 4
-"""How many times as long it has for its first one, as the clock begins while others still start: layer after layer."""
+START_PATIENCE = 240.0
+"""The same for all of them to connect, as the clock begins while others still start: layer after layer."""
 
 
 @dataclass
@@ -50,23 +50,20 @@ class Stepper:
     _ended: set[str] = field(default_factory=set)
     _next: dict[str, int] = field(default_factory=dict)
     _exact: Fraction = Fraction(EPOCH)
-    _cameras: list[str] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self._backlog = {name: [] for name in self.roles.all}
 
     def takers(self, data_type: int) -> list[str]:
         return [name for name in self.roles.all if data_type in self._consumed.get(name, ())]
 
-    def connect(self) -> None:
-        """Find all services and what they consume, before time begins; raises ServiceSilent."""
-        results = self._go(self.roles.all, EPOCH - 1)
-        self._cameras = [result.service for result in results if result.about and result.about.memories]
-        self._consumed = {r.service: frozenset(r.about.consumes) for r in results if r.about and r.about.consumes}
-
     def start(self) -> None:
-        """Let the application start, until it rests; raises ApplicationSilent and ServiceSilent."""
-        self.application.start(self.now, self._cameras)
+        """Find all services and what they consume, then let the application start until it rests.
+
+        Raises ApplicationSilent and ServiceSilent.
+        """
+        self.link.connect(START_PATIENCE, self.stopped)
+        self._backlog = {name: [] for name in self.roles.all}
+        results = self._go(self.roles.all, EPOCH - 1)
+        self._consumed = {r.service: frozenset(r.about.consumes) for r in results if r.about and r.about.consumes}
+        self.application.start(self.now, {r.service for r in results if r.about and r.about.memories})
 
     def run(self, begin: Envelope) -> None:
         """Until all evaluators have ended; raises ApplicationSilent, ServiceSilent and TimeOver."""
@@ -134,12 +131,11 @@ class Stepper:
         results: list[Done] = []
         began = time.monotonic()
         for name in names:
-            patience = SERVICE_PATIENCE * (1 if name in self._next else FIRST_TIMES)
             while (result := self.link.result(name, SLICE_S)) is None:
                 if self.stopped():
                     return results
-                if time.monotonic() - began > patience:
-                    raise ServiceSilent(f"service '{name}' did not answer the clock within {patience:g} s")
+                if time.monotonic() - began > SERVICE_PATIENCE:
+                    raise ServiceSilent(f"service '{name}' did not answer the clock within {SERVICE_PATIENCE:g} s")
             self._take(result)
             results.append(result)
         return results

@@ -1,5 +1,7 @@
 """The application whose own time is the test's: the agent lets it run up to a time, and says when it rests."""
 
+import math
+import re
 import statistics
 import time
 from collections import Counter
@@ -40,21 +42,20 @@ _NS = 1000
 _MOST_NOTES = 64
 
 
-@dataclass
 class SentMessages:
-    """Collects all that the application sends and services consume, under any sender stamp, as they count those."""
+    """Collects all that the application sends and services consume, under any sender stamp, as they count those.
 
-    heard: tuple[MessageFilter, ...]
-    answers: int = 0
-    uncopied: int = 0
-    """Those of them but the first in which that did not carry the sample time of the last frame."""
-    _frames: set[int] = field(default_factory=set)
-    _sent: list[Envelope] = field(default_factory=list)
-    _counts: Counter[int] = field(default_factory=Counter)
+    ``answers`` counts the steps in which it sent something, ``uncopied`` those of them but the first in which that did
+    not carry the sample time of the last frame.
+    """
 
-    @property
-    def filters(self) -> tuple[MessageFilter, ...]:
-        return self.heard
+    def __init__(self, filters: Sequence[MessageFilter]) -> None:
+        self.filters = filters
+        self.answers = self.uncopied = 0
+        self._names = {each.data_type: each.name.partition("/")[0].rpartition(".")[2] for each in filters}
+        self._frames: set[int] = set()
+        self._sent: list[Envelope] = []
+        self._counts = Counter[int]()
 
     def expect(self, sampled: Iterable[int]) -> None:
         """Frames with these sample times (us) are shown, and to be answered."""
@@ -62,14 +63,12 @@ class SentMessages:
 
     def take(self, envelope: Envelope) -> None:
         """Take a message from the bus; raises ApplicationFloods."""
-        if all(each.data_type != envelope.data_type for each in self.heard):
+        if (name := self._names.get(envelope.data_type)) is None:
             return
         self._counts[envelope.data_type] += 1
         if self._counts[envelope.data_type] > MOST_SENT:
-            name = next(each.name for each in self.heard if each.data_type == envelope.data_type)
-            message = name.partition("/")[0].rpartition(".")[2]
             raise ApplicationFloods(
-                f"the application sent more than {MOST_SENT} {message}s within a step: it floods the bus"
+                f"the application sent more than {MOST_SENT} {name}s within a step: it floods the bus"
             )
         self._sent.append(envelope)
 
@@ -80,7 +79,7 @@ class SentMessages:
         """
         sent, self._sent = self._sent, []
         self._counts.clear()
-        own = [envelope for envelope in sent if any(each.matches(envelope) for each in self.heard)]
+        own = [envelope for envelope in sent if any(each.matches(envelope) for each in self.filters)]
         self.answers += bool(own)
         self.uncopied += self.answers > 1 and any(envelope.sample_time not in self._frames for envelope in own)
         return [envelope._replace(received=min(max(envelope.sent, after) + 1, until)) for envelope in sent]
@@ -107,35 +106,28 @@ class ResponseTimes:
         taken = self._taken[1:]
         if not taken:
             return {}
-        worst = max(taken)
-        times = {"median_s": statistics.median(taken), "p95_s": _percentile(taken, 0.95), "worst_s": worst}
+        ordered = sorted(taken)
         return {
             "answers": len(taken),
             "period_s": self.period_s,
-            **times,
+            "median_s": statistics.median(taken),
+            "p95_s": ordered[math.ceil(0.95 * len(ordered)) - 1],
+            "worst_s": ordered[-1],
             "slow": sum(each > self.period_s for each in taken),
-            "worst_frame": self._frames[1 + taken.index(worst)],
+            "worst_frame": self._frames[1 + taken.index(ordered[-1])],
             "over": None if self.limit_s is None else sum(each > self.limit_s for each in taken),
             "processor": processor_name(),
         }
 
 
-def _percentile(values: Sequence[float], share: float) -> float:
-    """The smallest value that at least this share of the values does not exceed."""
-    ordered = sorted(values)
-    return ordered[min(len(ordered) - 1, max(0, -int(-share * len(ordered) // 1) - 1))]
-
-
-def processor_name(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
-    """The processor as Linux names it, with its clock where it says one; empty if it says nothing."""
+def processor_name() -> str:
+    """The processor as Linux names it; empty if it says nothing."""
     try:
-        lines = cpuinfo.read_text(errors="replace").splitlines()
+        text = Path("/proc/cpuinfo").read_text(errors="replace")
     except OSError:
         return ""
-    facts = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in reversed(lines))}
-    name = facts.get("model name") or facts.get("Model") or facts.get("Hardware") or ""
-    clock = facts.get("cpu MHz", "")
-    return f"{name}, {float(clock):.0f} MHz" if name and clock.replace(".", "", 1).isdigit() else name
+    found = re.search(r"^(?:model name|Model|Hardware)\s*:\s*(.+)$", text, re.MULTILINE)
+    return found[1] if found else ""
 
 
 class RestingApplication:
@@ -161,6 +153,7 @@ class RestingApplication:
         self._unread: set[str] = set()
         """Cameras whose pictures nobody has waited for yet."""
         self._held: list[str] = []
+        """Cameras with a picture that is to be shown."""
         self._shown_at = self._until = 0
         self._taken_s = 0.0
         self._gone: frozenset[int] = frozenset()
@@ -174,14 +167,8 @@ class RestingApplication:
     def start(self, now: int, cameras: Collection[str]) -> None:
         """Let it start at a time (us), until it rests; raises ApplicationSilent and ServiceSilent."""
         self._unread = {*cameras}
-        self._agent.open(self._stopped)
         self._shown_at = now
         self._run(now)
-
-    def _is_awaited(self, camera: str) -> bool:
-        self._link.send(camera, Show(awaits=False, announces=False))
-        done = self._result(camera)
-        return done is not None and done.awaited
 
     def expect(self, now: int) -> None:
         """What it sends counts at its own time, whatever services send."""
@@ -201,16 +188,17 @@ class RestingApplication:
         self._announce()
 
     def _announce(self) -> None:
-        held, self._held = self._held, []
-        for camera in held:
-            if camera in self._unread and not self._is_awaited(camera):
-                self._held.append(camera)
-            else:
-                self._unread.discard(camera)
-                self._link.send(camera, Show(awaits=False, announces=True))
-        for camera in held:
-            if camera not in self._held:
-                self._result(camera)
+        """Show the pictures, but the first one of a camera only when it is awaited."""
+        asked = [camera for camera in self._held if camera in self._unread]
+        awaited = [done.service for done in self._go(asked, Show(awaits=False, announces=False)) if done.awaited]
+        self._unread.difference_update(awaited)
+        self._go([camera for camera in self._held if camera not in self._unread], Show(awaits=False, announces=True))
+        self._held = [camera for camera in self._held if camera in self._unread]
+
+    def _go(self, cameras: Sequence[str], command: Show) -> list[Done]:
+        for camera in cameras:
+            self._link.send(camera, command)
+        return [done for camera in cameras if (done := self._result(camera)) is not None]
 
     def await_answer(self, until: int) -> None:
         """Let it go on to ``until`` (us); raises ApplicationSilent, ApplicationFloods and ServiceSilent."""
@@ -224,7 +212,7 @@ class RestingApplication:
         """The application's messages since the last time, for the services, in the order in which they were sent."""
         before = self.answers.answers
         sent = self.answers.collect(self._shown_at, self._until)
-        if self.answers.answers > before or not self.answers.heard:
+        if self.answers.answers > before or not self.answers.filters:
             self.response.add(self.frames, self._taken_s)
         return sent
 

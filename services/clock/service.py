@@ -16,7 +16,7 @@ from services.base.members import SenderTable
 from services.base.runner import tell
 from services.clock.agent import TimeAgent
 from services.clock.answers import AnsweringApplication, Answers, filters
-from services.clock.exchange import Exchange, Roles, ServiceSilent, TestEnded
+from services.clock.exchange import Exchange, Roles, TestEnded
 from services.clock.model import Stepper
 from services.clock.printed_lines import PrintedLines
 from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
@@ -40,7 +40,7 @@ class ClockService(Service):
         roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
         self._exchange = Exchange(self._session, socket_path(), roles.all, self._take, self._senders)
         self._application = self._application_of(context)
-        self._answers: Answers | SentMessages = self._application.answers
+        self._answers = self._application.answers
         self._session.hear_only([*(each.data_type for each in self._answers.filters), *self._senders.ids])
         period, timeout = period_of(flags["freq"]), round(flags["timeout"] * MICROSECONDS)
         self._stepper = Stepper(roles, period, timeout, self._application, self._exchange, self._over)
@@ -50,15 +50,15 @@ class ClockService(Service):
 
     def _application_of(self, context: Context) -> AnsweringApplication | RestingApplication:
         """The application, which rests where something lets its time go on, and else answers."""
-        flags, ids = context.flags, {name: context.messages.id(name) for name in context.messages.names()}
-        done = filters([flags["done"]] if flags["done"] else [], ids)
-        answers = Answers(filters(flags["answers"], ids), filters(flags["hears"], ids), done[0] if done else None)
+        flags = context.flags
+        required, relayed = (filters(flags[name], context.messages) for name in ("answers", "hears"))
+        done = filters([flags["done"]], context.messages)[0] if flags["done"] else None
+        answers = Answers(required, relayed, done)
         if not flags["time-folder"] or os.environ.get("DODO_ANSWERS"):
             return AnsweringApplication(answers, self._exchange, self._over)
         agent = TimeAgent(Path(flags["time-folder"]))
         context.resources.callback(agent.close)
-        with suppress(ServiceSilent):  # the first step says so; it is opened before an application could find it
-            agent.open(lambda: False)
+        agent.open()  # before an application could find it
         response = ResponseTimes(1 / flags["freq"], flags["max-response"])
         sent, names = SentMessages(answers.filters), flags["application"]
         return RestingApplication(sent, agent, self._exchange, self._over, response, names, self._lines)
@@ -71,7 +71,7 @@ class ClockService(Service):
     def _step(self) -> None:
         ended: TestEnded | None = None
         try:
-            self._stepper.connect()
+            self._stepper.start()
             if (begin := self._await_begin()) is None:
                 return
             self._begun = time.monotonic()
@@ -103,7 +103,6 @@ class ClockService(Service):
 
     def _await_begin(self) -> Envelope | None:
         """The start that the runner announces; one of its own where DODO_RUNNER says that there is none."""
-        self._stepper.start()
         if os.environ.get("DODO_RUNNER") == "":
             begin = self._session.messages.type(BEGIN)()
             return Envelope(self._begin_id, self._session.messages.encode(begin), 0, 0, 0, 0)

@@ -53,6 +53,7 @@ def agent(folder: Path, answer: Answer = lambda until: [reached(until)]) -> Iter
     thread.start()
     made = TimeAgent(folder)
     try:
+        made.open()
         yield made
     finally:
         if thread.is_alive():
@@ -78,23 +79,23 @@ class Link:
         return lambda *_, **__: None
 
 
-IDS = {name: MessageSet.standard().id(name) for name in (STEER, "opendlv.proxy.PedalPositionRequest")}
+MESSAGES = MessageSet.standard()
 
 
 def steering(sent: int, sampled: int = 5, stamp: int = 0) -> Envelope:
-    return Envelope(IDS[STEER], b"", sent, 1, sampled, stamp)
+    return Envelope(MESSAGES.id(STEER), b"", sent, 1, sampled, stamp)
 
 
 def application(
     agent: TimeAgent, sent: SentMessages | None = None, link: object = None, lines: object = None
 ) -> RestingApplication:
-    heard, known = sent or SentMessages(filters([STEER], IDS)), cast(Exchange, link or Link())
+    heard, known = sent or SentMessages(filters([STEER], MESSAGES)), cast(Exchange, link or Link())
     names, printed, patience = ("driver", "eye"), cast(PrintedLines, lines), Patience(0.4, 0.2)
     return RestingApplication(heard, agent, known, lambda: False, ResponseTimes(), names, printed, patience)
 
 
 def test_messages_count_when_they_were_sent_and_no_later_than_now(tmp_path: Path) -> None:
-    sent = SentMessages(filters([f"{STEER}/0"], IDS))
+    sent = SentMessages(filters([f"{STEER}/0"], MESSAGES))
     waiting = [steering(EPOCH - 9)]
 
     def drain() -> None:
@@ -104,7 +105,7 @@ def test_messages_count_when_they_were_sent_and_no_later_than_now(tmp_path: Path
     def answer(until: int) -> list[object]:
         if until > EPOCH + resting.EXPOSED_US:
             waiting.extend(steering(EPOCH + at, stamp=stamp) for at, stamp in ((-5, 0), (7, 0), (7, 3), (10**9, 0)))
-            waiting.append(steering(EPOCH)._replace(data_type=IDS["opendlv.proxy.PedalPositionRequest"]))
+            waiting.append(steering(EPOCH)._replace(data_type=MESSAGES.id("opendlv.proxy.PedalPositionRequest")))
         return [reached(until)]
 
     with agent(tmp_path, answer) as time:
@@ -196,7 +197,7 @@ def test_a_destroyed_page_fails_the_application_and_an_agent_that_ends_does_not(
 
 def test_what_is_computed_for_each_answer_is_measured(tmp_path: Path) -> None:
     """By the agent; by the wall clock where a process has ended, whose last part is not known."""
-    sent = SentMessages(filters([STEER], IDS))
+    sent = SentMessages(filters([STEER], MESSAGES))
     ran = iter([(0.5, False), (0.0, False), (0.0, False), *[(1e-6, False)] * 2, (9.0, False), (0.0, True)])
 
     def answer(until: int) -> list[object]:
@@ -225,7 +226,7 @@ class Cameras(Link):
 
     def result(self, service: str, timeout: float = 0.0) -> Any:
         self._asked[service] += 1
-        return SimpleNamespace(awaited=self._asked[service] >= self._awaited[service])
+        return SimpleNamespace(service=service, awaited=self._asked[service] >= self._awaited[service])
 
 
 def test_the_first_picture_of_a_camera_is_shown_when_the_application_waits_for_it(tmp_path: Path) -> None:
@@ -273,7 +274,7 @@ def test_the_way_of_one_who_acts_by_a_timer_is_as_computed_by_hand(tmp_path: Pat
                 for now in range(went[-1], until):
                     if (now - EPOCH) % every == 0:
                         payload = session.messages.encode(request(groundSteering=1.5 - place))
-                        session.send_envelope(Envelope(IDS[STEER], payload, now, 0, 0, 0))
+                        session.send_envelope(Envelope(MESSAGES.id(STEER), payload, now, 0, 0, 0))
                 went.append(until)
             return [reached(until, services=[0])]
 

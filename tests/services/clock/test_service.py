@@ -44,8 +44,8 @@ def driven(session: Session, *flags: str, stopped: bool = False) -> None:
 def test_a_service_that_does_not_answer_is_reported(
     cid: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(model, "SERVICE_PATIENCE", 0.1)
-    reason = "service 'gone' did not answer the clock within 0.4 s"
+    monkeypatch.setattr(model, "START_PATIENCE", 0.1)
+    reason = "service 'gone' did not connect within 0.1 s"
     with Session(cid) as session:
         driven(session, "--judge=gone")
     assert [json.loads(line) for line in capsys.readouterr().out.splitlines()] == [

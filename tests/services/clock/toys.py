@@ -218,8 +218,9 @@ class Toys:
         try:
             with Session(self.cid) as session, ExitStack() as resources:
                 path = Path(resources.enter_context(tempfile.TemporaryDirectory()), "clock")
-                ids = {name: session.messages.id(name) for name in session.messages.names()}
-                answers: Answers | SentMessages = Answers(filters(self.answers, ids), filters(self.relayed, ids))
+                messages = session.messages
+                required, relayed = (filters(names, messages) for names in (self.answers, self.relayed))
+                answers: Answers | SentMessages = Answers(required, relayed)
                 if self.agent:
                     answers = SentMessages(answers.filters)
                 exchange = resources.enter_context(closing(Exchange(session, path, makers, answers.take)))
@@ -232,9 +233,8 @@ class Toys:
                     for app in apps:
                         app.start()
                         started.append(app)
-                    stepper.connect()
                     stepper.start()
-                    stepper.run(Envelope(ids["dodo.TestBegin"], b"", 0, 0, EPOCH, 0))
+                    stepper.run(Envelope(messages.id("dodo.TestBegin"), b"", 0, 0, EPOCH, 0))
         finally:
             for app in started:  # the services have removed the memory that it waits for
                 app.join()
