@@ -5,6 +5,7 @@ import math
 import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -50,20 +51,17 @@ def parameters(manifest: Mapping[str, Any]) -> dict[str, About]:
     return {**own, **{name: about for name, about in COMMON.items() if name not in own}}
 
 
-def unit(about: About) -> str:
-    """`` Hz``, or nothing; shares, whose unit is 1, have none."""
-    return "" if about.get("unit") in (None, "", "1") else f" {about['unit']}"
+_LIMITS = {"minimum": "at least", "maximum": "at most", "multiple-of": "a multiple of"}
 
 
-def bounds(about: About) -> str:
-    low, high = about.get("minimum"), about.get("maximum")
-    if about.get("choices"):
-        return ", ".join(about["choices"])
-    if low is not None and high is not None:
-        return f"{low} to {high}"
-    if low is not None:
-        return f"at least {low}"
-    return f"at most {high}" if high is not None else ""
+def facts(about: About) -> str:
+    """What a parameter takes: ``number in Hz, at least 1, at most 1000``; shares, whose unit is 1, have none."""
+    unit = "" if about.get("unit") in (None, "", "1") else f" in {about['unit']}"
+    kind = about["type"].replace("amount", "number or share" if about.get("or-share") else "number")
+    choices = [f"one of {', '.join(about['choices'])}"] if about.get("choices") else []
+    return ", ".join(
+        [kind + unit, *(f"{word} {about[key]}" for key, word in _LIMITS.items() if key in about), *choices]
+    )
 
 
 def example_of(about: About) -> str:
@@ -107,21 +105,17 @@ def _amount(text: str) -> float | Share | None:
     return number if number is None or not text.endswith("%") else Share(number / 100)
 
 
-def _text(text: str) -> str | None:
-    return text or None
-
-
-_KINDS: dict[str, tuple[str, Callable[[str], Value]]] = {
-    "number": ("a finite number", _number),
-    "integer": ("a whole number", lambda text: int(text) if _INTEGER.fullmatch(text) else None),
-    "amount": ("a finite number", _amount),
-    "boolean": ("true or false", lambda text: _BOOLEANS.get(text.lower())),
-    "path": ("a path", _text),
-    "memory": ("a name", _text),
-    "output": ("a file to write", _text),
-    "list": ("a list of items with commas between them", lambda text: [part for part in text.split(",") if part]),
+_READERS: dict[str, Callable[[str], Value]] = {
+    "number": _number,
+    "integer": lambda text: int(text) if _INTEGER.fullmatch(text) else None,
+    "amount": _amount,
+    "boolean": lambda text: _BOOLEANS.get(text.lower()),
+    "path": lambda text: text or None,
+    "memory": lambda text: text or None,
+    "output": lambda text: text or None,
+    "list": lambda text: [part for part in text.split(",") if part],
 }
-"""What a value of each type is, and its reader, which gives None for anything else."""
+"""By type, what gives the value of a text, and None for what is none; other types are texts."""
 
 
 class FlagsError(ValueError):
@@ -139,20 +133,19 @@ def parser(manifest: Mapping[str, Any]) -> argparse.ArgumentParser:
     command = " ".join(manifest["process"])
     found = _Parser(command, "%(prog)s --key=value ...", manifest["description"], example, allow_abbrev=False)
     for name, about in parameters(manifest).items():
-        more: dict[str, Any] = {"nargs": "?", "const": "true"} if about["type"] == "boolean" else {}
+        more: dict[str, Any] = {"nargs": "?", "const": True} if about["type"] == "boolean" else {}
         more |= {"required": bool(about.get("required")), "default": argparse.SUPPRESS, "help": _help(about)}
-        found.add_argument(f"--{name}", dest=name, metavar=example_of(about), **more)
+        found.add_argument(f"--{name}", dest=name, metavar=example_of(about), type=partial(_value, about), **more)
     return found
 
 
 def parse(manifest: Mapping[str, Any], argv: Sequence[str]) -> Flags:
     """The values that a command line gives; raises FlagsError."""
-    known, words = parameters(manifest), vars(parser(manifest).parse_args(argv))
-    given = {name: _value(name, known[name], text) for name, text in words.items()}
+    given = vars(parser(manifest).parse_args(argv))
     for group in manifest.get("one-of") or ():
         if not any(name in given for name in group):
             raise FlagsError(f"give one or more of --{', --'.join(group)}")
-    return Flags({name: given.get(name, _default(about)) for name, about in known.items()})
+    return Flags({name: given.get(name, _default(about)) for name, about in parameters(manifest).items()})
 
 
 def _default(about: About) -> Value:
@@ -160,24 +153,22 @@ def _default(about: About) -> Value:
     return float(value) if about["type"] in ("number", "amount") and isinstance(value, int) else value
 
 
-def _value(name: str, about: About, text: str) -> Value:
+def _value(about: About, text: str) -> Value:
     if "of" in about:
         item = {**{key: fact for key, fact in about.items() if key != "of"}, "type": about["of"]}
-        return [_value(name, item, part) for part in text.split(",") if part]
-    kind, read = _KINDS.get(about["type"], ("a text", str))
-    value, expected = read(text), kind + (f" in{unit(about)}" if unit(about) else "")
+        return [_value(item, part) for part in text.split(",") if part]
+    value = _READERS.get(about["type"], str)(text)
     amount = value.of_one if isinstance(value, Share) else value
     low, high = about.get("minimum", -math.inf), about.get("maximum", math.inf)
-    if value is None:
-        raise FlagsError(f"--{name}={text} is not {expected}")
-    if about.get("choices") and value not in about["choices"]:
-        raise FlagsError(f"--{name}={text} is not one of {bounds(about)}")
-    if isinstance(value, Share) and not about.get("or-share"):
-        raise FlagsError(f"--{name}={text} is a share, expected {expected}")
-    if isinstance(value, int) and value % (step := about.get("multiple-of", 1)):
-        raise FlagsError(f"--{name}={text} is not a multiple of {step}")
-    if isinstance(amount, int | float) and not low <= amount <= high:
-        raise FlagsError(f"--{name}={text} is out of range, expected {bounds(about)}{unit(about)}")
+    fits = (
+        value is not None
+        and (not about.get("choices") or value in about["choices"])
+        and (not isinstance(value, Share) or about.get("or-share"))
+        and not (isinstance(value, int) and value % about.get("multiple-of", 1))
+        and (not isinstance(amount, int | float) or low <= amount <= high)
+    )
+    if not fits:
+        raise argparse.ArgumentTypeError(f"'{text}', expected {facts(about)}")
     return value
 
 
@@ -190,7 +181,6 @@ def example_line(manifest: Mapping[str, Any]) -> str:
 
 
 def _help(about: About) -> str:
-    facts = [about["type"] + unit(about), bounds(about)]
-    if about.get("default") not in (None, [], ""):
-        facts.append(f"default {example_of({'default': about['default'], 'type': about['type']})}")
-    return f"{about['help']} ({', '.join(filter(None, facts))})".replace("%", "%%")
+    default = about.get("default")
+    shown = "" if default in (None, [], "") else f", default {example_of({'default': default, 'type': about['type']})}"
+    return f"{about['help']} ({facts(about)}{shown})".replace("%", "%%")

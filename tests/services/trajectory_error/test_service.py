@@ -154,7 +154,7 @@ def test_without_a_truth_to_judge_by_there_is_no_verdict(flags: Any, frames: lis
     ("flags", "said"),
     [
         (("--max-rpe=1", "--delta=0.5"), "--delta=0.5 is not a whole number of frames"),
-        (("--max-rpe=1", "--delta-unit=km"), "--delta-unit=km is not one of frames, m, s"),
+        (("--max-rpe=1", "--delta-unit=km"), "'km', expected string, one of frames, m, s"),
     ],
 )
 def test_flags_that_leave_something_open_are_refused(flags: tuple[str, ...], said: str) -> None:
