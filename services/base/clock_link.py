@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
+from dodo_dsl.opendlv.address_book import HEARTBEAT, RUNNER, AddressBook
 from dodo_dsl.opendlv.channel import Channel, Done, Show, Step
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.packets import CLOCK_SOCKET
@@ -27,24 +28,22 @@ def socket_path() -> Path:
 class ClockClient:
     """Receives commands and answers them. It waits for the clock."""
 
-    is_over = False
-
     def __init__(self, session: Session, name: str, path: Path | None = None) -> None:
         self._session = session
         self._channel = Channel.connect(path or socket_path(), name)
         self._begin = session.messages.id("dodo.TestBegin")
-        self._pause = 0.001
+        self._book = AddressBook(channel())
 
-    def next(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | Show | None:
-        """The next command, or None after a while; ``observe`` takes everything that was on the bus before it."""
-        if not observes:
+    def next(self, observe: Callable[[Envelope], None] | None) -> Step | Show | None:
+        """The next command, or None after a while; ``observe`` takes what others than services sent before it."""
+        if observe is None:
             self._session.deafen()
             return self._receive(SLICE_S)
         command = self._receive(0.0)
-        if self._drain(observe) and command is None:
-            select.select([self._channel], [], [], _MEANWHILE)
-        elif command is None:
-            select.select([self._channel.fileno(), self._session.fileno()], [], [], SLICE_S)
+        has_heard = self._drain(observe)
+        if command is None:
+            heard = [] if has_heard else [self._session.fileno()]
+            select.select([self._channel.fileno(), *heard], [], [], _MEANWHILE if has_heard else SLICE_S)
         return command
 
     def answer(self, done: Done) -> None:
@@ -57,16 +56,20 @@ class ClockClient:
         try:
             command = self._channel.receive(timeout)
         except EOFError:  # the clock has ended, and the runner will end this service
-            time.sleep(self._pause)
-            self._pause = min(2 * self._pause, SLICE_S)
+            time.sleep(_MEANWHILE)
             return None
         assert not isinstance(command, Done), "the clock gives commands"
         return command
 
-    def _drain(self, observe: Callable[[Envelope], None]) -> int:
-        taken = 0
+    def _drain(self, observe: Callable[[Envelope], None]) -> bool:
+        """Take the bus: messages of services come with the steps, and the runner's begin, too."""
+        has_heard = False
         while (envelope := self._session.receive(0.0)) is not None:
-            if envelope.data_type != self._begin:
+            has_heard, source = True, self._session.source
+            is_of_service = self._book.knows(source, envelope.received) and source not in (
+                self._book.addresses.get(RUNNER),
+                self._book.addresses.get(HEARTBEAT),
+            )
+            if envelope.data_type != self._begin and not is_of_service:
                 observe(envelope)
-            taken += 1
-        return taken
+        return has_heard

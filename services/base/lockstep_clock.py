@@ -11,7 +11,7 @@ the bus, which does not count here.
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from fractions import Fraction
 from functools import partial
 from itertools import groupby, islice
@@ -29,7 +29,6 @@ from services.base.clock_link import ClockClient
 
 if TYPE_CHECKING:
     from services.base.loop import Loop
-    from services.base.recorded_clock import RecordedSteps
 
 _POLL_S = 0.0002
 _LONGEST_POLL_S = 0.002
@@ -77,70 +76,45 @@ EPOCH = 1_700_000_000_000_000
 LONGEST = 2 * 86_400_000_000
 """Longest test, in microseconds."""
 
-_REMEMBERED, _MOST_LAST = 50, 10_000
-_Key = tuple[int, bytes, int, int, int]
+_MOST_LAST = 10_000
+RECORDED_STEP, RECORDING_END = "dodo.RecordedStep", "dodo.RecordingEnd"
 
 
 class Observer:
     """Merges the messages of the test's services, which the clock passes on completely, with the rest of the bus.
 
-    Messages of services may be on the bus, too, early or late: those from the clock count. Messages of the application
-    count as they are on the bus, not as the clock passes them on. ``marked`` adds to a step (its time in us, and all
-    messages that the clock passes on) what shows in a recording how it went.
+    Messages of the application count as they are on the bus, not as the clock passes them on. Marks show in a recording
+    how each step went: their sample time is that of the step before.
     """
 
-    def __init__(self, marked: Callable[[int, Sequence[Envelope]], Iterable[Envelope]] | None = None) -> None:
-        self._marked = marked
+    def __init__(self, messages: MessageSet) -> None:
+        self._messages, self._type, self._id = messages, messages.type(RECORDED_STEP), messages.id(RECORDED_STEP)
         self._collected: list[Envelope] = []
-        self._steps = 0
-        self._relayed: deque[set[_Key]] = deque(maxlen=2)
+        self._number = 0
+        self._last = EPOCH
 
     def collect(self, envelope: Envelope) -> None:
+        """Take what others than services sent on the bus."""
         self._collected.append(envelope)
 
     def deliver(self, inbox: "Loop", until: int, relayed: Sequence[Envelope]) -> None:
         """Deliver all of a step (its end ``until`` in us). The answer to it waits: whether it is there is chance."""
-        own = [envelope for envelope in relayed if not envelope.received]
-        if self._steps % _REMEMBERED == 0:
-            self._relayed.append(set())
-        self._steps += 1
-        self._relayed[-1].update(map(_key, own))
         collected, self._collected = self._collected, []
         for envelope in collected:
             if until <= envelope.sample_time <= EPOCH + LONGEST:
                 self._collected.append(envelope)
-            elif not self._is_known(_key(envelope)):
+            else:
                 inbox.observe(envelope)
-        for envelope in self._marked(until, relayed) if self._marked else own:
+        for envelope in self._marked(until, relayed):
             inbox.observe(envelope)
 
     def flush(self, inbox: "Loop") -> None:
         """The test is over: deliver what waits for a step that will not come."""
         for envelope in self._collected:
-            if not self._is_known(_key(envelope)):
-                inbox.observe(envelope)
+            inbox.observe(envelope)
         self._collected = []
 
-    def _is_known(self, key: _Key) -> bool:
-        return any(key in keys for keys in self._relayed)
-
-
-def _key(envelope: Envelope) -> _Key:
-    return envelope.data_type, envelope.payload, envelope.sent, envelope.sample_time, envelope.sender_stamp
-
-
-RECORDED_STEP, RECORDING_END = "dodo.RecordedStep", "dodo.RecordingEnd"
-
-
-class StepMarks:
-    """Makes the envelopes that mark steps in a recording; their sample time is that of the step before."""
-
-    def __init__(self, messages: MessageSet) -> None:
-        self._messages, self._type, self._id = messages, messages.type(RECORDED_STEP), messages.id(RECORDED_STEP)
-        self._number = 0
-        self._last = EPOCH
-
-    def of(self, time: int, relayed: Sequence[Envelope]) -> Iterator[Envelope]:
+    def _marked(self, time: int, relayed: Sequence[Envelope]) -> Iterator[Envelope]:
         """What a recording holds of a step at ``time`` (us) that brought ``relayed``; one mark at least."""
         self._number += 1
         if not relayed or not relayed[0].received:
@@ -160,16 +134,14 @@ class LockstepClock(Clock):
 
     relays = True
 
-    def __init__(
-        self, session: Session, name: str, readers: int, source: "ClockClient | RecordedSteps | None" = None
-    ) -> None:
+    def __init__(self, session: Session, name: str, readers: int, client: ClockClient | None = None) -> None:
         self._name, self._readers = name, readers
-        self._source = source or ClockClient(session, name)
+        self._client = client or ClockClient(session, name)
         self._now = EPOCH - 1
         self._open = False
         self._sent: list[Envelope] = []
         self._memories: list[AnnouncedMemory] = []
-        self._observer = Observer(StepMarks(session.messages).of)
+        self._observer = Observer(session.messages)
         self._next = 0
         self._address = session.address
         self._about: About | None = None
@@ -254,15 +226,17 @@ class LockstepClock(Clock):
         """Answer the open step. Memories stay until the test is over, else the last picture were shown once more."""
         if self._open:
             self._answer(ended=True)
-        self._source.close()
+        self._client.close()
         if self._memories:
             look_until(stopped)
 
     def _command(self, inbox: "Loop", stopped: Callable[[], bool]) -> Step | Show | None:
-        while not (stopped() or self._source.is_over):
-            if command := self._source.next(inbox.observes, self._observer.collect):
-                self._open = True
-                return command
+        observe = self._observer.collect if inbox.observes else None
+        with suppress(EOFError):
+            while not stopped():
+                if command := self._client.next(observe):
+                    self._open = True
+                    return command
         return None
 
     def _answer(self, ended: bool = False) -> None:
@@ -271,7 +245,7 @@ class LockstepClock(Clock):
         pictures = sum(memory.is_new for memory in memories)
         sampled = max((memory.sampled for memory in memories), default=0)
         awaited = bool(memories) and self._is_awaited()
-        self._source.answer(Done(self._name, sent, pictures, sampled, self._next, ended, about, awaited))
+        self._client.answer(Done(self._name, sent, pictures, sampled, self._next, ended, about, awaited))
 
 
 def in_order(messages: Iterable[Envelope]) -> deque[tuple[int, Envelope]]:

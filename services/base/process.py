@@ -8,11 +8,8 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, NoReturn
-
-from google.protobuf.message import Message
 
 from dodo_dsl.opendlv import address_book
 from dodo_dsl.opendlv.address import is_of_the_world
@@ -24,27 +21,18 @@ from services.base.flags import Flags, FlagsError, load_manifest, parse
 from services.base.loop import Loop
 from services.base.members import Members, SenderTable, World, channel
 from services.base.runner import connected, say, tell
-from services.base.service import Build, Context, Service, Verdict
+from services.base.service import Build, Context, Service
 
 _OURS = ("dodo_dsl.", "services.")
 _BASE = Path(__file__).resolve().parent
 
 
-def tell_crash(error: Exception, *, expected: bool) -> None:
+def _log_end(error: Exception, *, expected: bool) -> None:
     """Logs the error; the last line is one sentence. ``expected`` means that its own text is one for users."""
     if not expected and not type(error).__module__.startswith(_OURS):
         logging.error("it ended by an error", exc_info=error)
-    text = _unknown_field(error) or " ".join(str(error).split())
+    text = " ".join(str(error).split())
     logging.critical("%s", text if expected else f"{type(error).__name__}: {text}")
-
-
-def _unknown_field(error: Exception) -> str:
-    """What is wrong where a message has no field of the name that was read; empty for anything else."""
-    if not isinstance(error, AttributeError) or not isinstance(error.obj, Message):
-        return ""
-    about = error.obj.DESCRIPTOR
-    fields = ", ".join(field.name for field in about.fields)
-    return f"{about.full_name} has no field '{error.name}'; it has {fields or 'no fields'}"
 
 
 DONE, BROKEN, USAGE = 0, 1, 2
@@ -109,16 +97,14 @@ def _serve(
         if place:
             address_book.remove(place, role)  # of one that was killed
         with ExitStack() as resources:
-            session = resources.enter_context(_session(flags["cid"], _messages(manifest, folder)))
-            world = World.load(session.messages)
-            if clock is None:
-                with interruptible():  # it waits for the clock service
-                    if stop():
-                        return DONE
-                    clock = _clock(session, role)
+            messages = _messages(manifest, folder)
+            with interruptible():  # it may wait for the clock service
+                if stop():
+                    return DONE
+                session, clock = _bus_and_clock(flags["cid"], messages, role, resources, clock)
             on_rig = bool(os.environ.get("DODO_RIG"))
-            service = build(Context(manifest["name"], flags, session.messages, resources, clock, session, on_rig))
-            members = _membership(session, role, world)
+            service = build(Context(manifest["name"], flags, messages, resources, clock, session, on_rig))
+            members = _membership(session, role)
             stamp = flags["id"] if isinstance(flags["id"], int) else 0  # its own list gives each message one
             loop = Loop(role, service, session, clock, stamp, members, bool(flags["ends-input"]))
             code = BROKEN
@@ -128,24 +114,17 @@ def _serve(
             try:
                 (service.drive or loop.run)(stop)
             finally:
-                if place or _recording():  # by hand nobody reads it
+                if place:  # by hand nobody reads it
                     _print_record(service)
             if service.verdict is not None:
-                for name in _undeclared(manifest, service.verdict):
-                    tell("note", text=f"check '{name}' is not under 'checks' in service.yml: no goal can name it")
                 say(service.verdict.line())
     except Exception as error:  # noqa: BLE001  (it is logged)
         if isinstance(error, MemoryTakenError):
             tell("taken", text=str(error))
         expected = code == USAGE and isinstance(error, ValueError | OSError)
-        tell_crash(error, expected=expected)
+        _log_end(error, expected=expected)
         return code if expected else BROKEN
     return DONE
-
-
-def _undeclared(manifest: Mapping[str, Any], verdict: Verdict) -> list[str]:
-    known = manifest.get("checks") or ("*",)
-    return [check.name for check in verdict.checks if not any(fnmatchcase(check.name, one) for one in known)]
 
 
 def _print_record(service: Service) -> None:
@@ -165,34 +144,27 @@ def _messages(manifest: Mapping[str, Any], folder: Path) -> MessageSet:
     return MessageSet.load(*own, kept=kept)
 
 
-def _recording() -> Path | None:
-    """The recording that is judged, and that takes the place of the bus: with ``DODO_CLOCK=recording``."""
-    return Path(os.environ["DODO_RECORDING"]) if os.environ.get("DODO_CLOCK") == "recording" else None
+def _bus_and_clock(
+    cid: int, messages: MessageSet, role: str, resources: ExitStack, clock: Clock | None
+) -> tuple[Session, Clock]:
+    """With ``DODO_CLOCK=recording``, a recording that is judged takes the place of the bus."""
+    kind = os.environ.get("DODO_CLOCK")
+    if kind == "recording":
+        from services.base.recorded_clock import SilentSession, clock_of
 
-
-def _session(cid: int, messages: MessageSet) -> Session:
-    if _recording() is None:
-        return Session(cid, messages)
-    from services.base.recorded_clock import SilentSession
-
-    return SilentSession(cid, messages)
-
-
-def _clock(session: Session, role: str) -> Clock:
-    if (recording := _recording()) is not None:
-        from services.base.recorded_clock import clock_of
-
-        return clock_of(recording, session, role)
-    if os.environ.get("DODO_CLOCK") != "lockstep":
-        return RealTimeClock()
+        silent = SilentSession(cid, messages)
+        return silent, clock_of(Path(os.environ["DODO_RECORDING"]), silent, role)
+    session = resources.enter_context(Session(cid, messages))
+    if clock or kind != "lockstep":
+        return session, clock or RealTimeClock()
     from services.base.lockstep_clock import LockstepClock
 
-    return LockstepClock(session, role, int(os.environ.get("DODO_READERS") or 1))
+    return session, LockstepClock(session, role, int(os.environ.get("DODO_READERS") or 1))
 
 
-def _membership(session: Session, role: str, world: World) -> Members | None:
+def _membership(session: Session, role: str) -> Members | None:
     """The test's services in real time; in lockstep the clock knows them."""
-    senders = SenderTable.load(session.messages)
+    senders, world = SenderTable.load(session.messages), World.load(session.messages)
     if os.environ.get("DODO_CLOCK") or not (senders.by_message or world):
         return None
     return Members(session, role, senders, world)

@@ -1,19 +1,19 @@
 """The clock for a recording: its steps where it has them, else its messages by when they were received."""
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dodo_dsl.opendlv.address import HEADER_BYTES, Address, body_length
+from dodo_dsl.opendlv.address import HEADER_BYTES, body_length
 from dodo_dsl.opendlv.channel import Done, Step
-from dodo_dsl.opendlv.envelope import Envelope, decode_frame, encode_frame
+from dodo_dsl.opendlv.envelope import Envelope, decode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from services.base.clock import Clock
+from services.base.clock_link import ClockClient
 from services.base.evaluator import UnjudgeableError
 from services.base.lockstep_clock import RECORDED_STEP, RECORDING_END, LockstepClock
 
@@ -21,33 +21,23 @@ if TYPE_CHECKING:
     from services.base.loop import Loop
 
 
-class RecordedSteps:
-    """Gives a LockstepClock recorded steps, without what the service sent itself and so did not hear."""
+class RecordedSteps(ClockClient):
+    """Gives a LockstepClock recorded steps."""
 
     def __init__(self, path: Path, messages: MessageSet) -> None:
-        self._steps: Iterator[Step] = read_steps(path, messages)
-        self._sent: Counter[Envelope] = Counter()
-        self.is_over = False
+        self._steps = read_steps(path, messages)
 
-    def next(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | None:
-        step = next(self._steps, None)
-        if step is None:
-            self.is_over = True
-            return None
-        return Step(step.time, [each for each in step.messages if not self._is_own(each)])
+    def next(self, observe: Callable[[Envelope], None] | None) -> Step:
+        """Raises EOFError behind the last one."""
+        if (step := next(self._steps, None)) is None:
+            raise EOFError
+        return step
 
     def answer(self, done: Done) -> None:
-        self._sent.update(map(_key, done.messages))
+        """Nobody waits for it."""
 
     def close(self) -> None:
         """Nothing is open."""
-
-    def _is_own(self, envelope: Envelope) -> bool:
-        key = _key(envelope)
-        if not self._sent[key]:
-            return False
-        self._sent[key] -= 1
-        return True
 
 
 def read_steps(path: Path, messages: MessageSet) -> Iterator[Step]:
@@ -80,10 +70,6 @@ def _decoded(frames: bytes) -> Iterator[Envelope]:
     while frames:
         yield decode_frame(frames)
         frames = frames[HEADER_BYTES + body_length(frames) :]
-
-
-def _key(envelope: Envelope) -> Envelope:
-    return envelope._replace(sent=0, received=0)
 
 
 class RecordingClock(Clock):
@@ -142,23 +128,14 @@ class SilentSession(Session):
     def __init__(self, cid: int, messages: MessageSet) -> None:
         self.cid, self.messages = cid, messages
         self.garbage = self.lost = 0
-        self.is_member = self.hears_directly = self.was_direct = False
+        self.was_direct = False
         self.address = self.source = ("", 0)
 
     def send_frames(self, frames: Iterable[bytes]) -> None:
         """Nobody hears it."""
-
-    def send_directly(self, envelope: Envelope, to: Iterable[Address]) -> bytes:
-        return encode_frame(envelope)
 
     def hear_directly(self, hears: bool = True) -> None:
         """There is nothing to hear."""
 
     def receive(self, timeout: float | None = 0.0) -> Envelope | None:
         return None
-
-    def deafen(self) -> None:
-        """There is nothing to hear."""
-
-    def close(self) -> None:
-        """Nothing is open."""

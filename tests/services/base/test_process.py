@@ -79,7 +79,6 @@ def test_a_message_decides(start: Start, cid: int) -> None:
         session.send(DISTANCE(distance=0.5))
         session.send(DISTANCE(distance=1.5))
         session.send(END())
-        assert service.line()["text"] == "check 'range' is not under 'checks' in service.yml: no goal can name it"
         assert service.line() == {
             "dodo": "verdict",
             "outcome": "failed",
@@ -100,7 +99,7 @@ def test_what_was_judged_comes_before_the_verdict_and_without_one(start: Start, 
         assert service.line() == {"dodo": "judged", **about}
         samples = service.line()
         assert (samples["samples"], samples["zero"], samples["marks"]) == ("Distance", 7, "Ag==")
-        assert [service.line()["dodo"] for _ in range(2)] == ["note", "verdict"]
+        assert service.line()["dodo"] == "verdict"
         assert service.end() == (0, "", "")
         stopped = start("--role=judge", DODO_CHANNEL=str(tmp_path))
         assert stopped.line() == READY
@@ -139,15 +138,11 @@ def test_messages_under_another_stamp_are_noted(start: Start, cid: int) -> None:
     assert service.line() == {"dodo": "note", "text": text}
 
 
-FIELD = "opendlv.proxy.GroundSteeringRequest has no field 'steering'; it has groundSteering"
-
-
 @pytest.mark.parametrize(
     ("role", "text"),
     [
         ("broken", "ZeroDivisionError: a model went wrong"),
         ("library", "JSONDecodeError: Expecting value: line 1 column 2 (char 1)"),
-        ("field", f"AttributeError: {FIELD}"),
         ("unjudgeable", "UnjudgeableError: the map has no goal"),
     ],
 )

@@ -7,12 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.channel import Done, Step
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from services.base.evaluator import UnjudgeableError
-from services.base.lockstep_clock import EPOCH, Observer, StepMarks
-from services.base.recorded_clock import RecordedSteps, RecordingClock, read_steps
+from services.base.lockstep_clock import EPOCH, Observer
+from services.base.recorded_clock import RecordingClock, read_steps
 from tests.services.base.lockstep.test_observer import Seen
 
 STEP = 100_000
@@ -50,7 +49,7 @@ raw = st.lists(st.builds(sent, names, st.integers(8, 9)), max_size=3)
 def test_steps_are_those_of_the_clock_whatever_was_on_the_bus(
     tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[list[Envelope], list[Envelope]]]
 ) -> None:
-    observer, recorder = Observer(StepMarks(MESSAGES).of), Recorder()
+    observer, recorder = Observer(MESSAGES), Recorder()
     for number, (messages, on_the_bus) in enumerate(steps):
         for envelope in on_the_bus:
             observer.collect(envelope)
@@ -63,23 +62,12 @@ def test_steps_are_those_of_the_clock_whatever_was_on_the_bus(
 
 
 def test_a_recording_with_a_hole_is_refused(tmp_path: Path) -> None:
-    marks = StepMarks(MESSAGES)
-    steps = [list(marks.of(EPOCH + number * STEP, [sent(str(number))])) for number in range(5)]
-    path = write(tmp_path / "test.rec", [*steps[0], *steps[4]])
+    observer, recorder = Observer(MESSAGES), Recorder()
+    for number in range(5):
+        observer.deliver(recorder, EPOCH + number * STEP, [sent(str(number))])
+    path = write(tmp_path / "test.rec", [*recorder.envelopes[:2], *recorder.envelopes[8:]])
     with pytest.raises(UnjudgeableError, match="lacks the steps 2 to 4: it was paused"):
         list(read_steps(path, MESSAGES))
-
-
-def test_a_service_does_not_hear_itself(tmp_path: Path) -> None:
-    marks, own = StepMarks(MESSAGES), sent("own")
-    first, second = marks.of(EPOCH, [sent("a")]), marks.of(EPOCH + STEP, [own, sent("b"), own])
-    source = RecordedSteps(write(tmp_path / "test.rec", [*first, *second]), MESSAGES)
-    assert source.next(False, lambda _: None) == Step(EPOCH, [sent("a")])
-    source.answer(Done("judge", [own._replace(sent=77)]))
-    assert source.next(False, lambda _: None) == Step(EPOCH + STEP, [sent("b"), own])
-    assert not source.is_over
-    assert source.next(False, lambda _: None) is None
-    assert source.is_over
 
 
 START = 1_750_000_000_000_000
