@@ -1,6 +1,5 @@
 """The one loop of all services: deliver, update, send, until there is a verdict, an end or a signal."""
 
-import functools
 import logging
 import operator
 import time
@@ -33,8 +32,7 @@ class Lateness:
         self._late_after = max(float(self._period) / 2, SHORTEST) if late_after is None else late_after
         self._last: int | None = None
         self._has_begun = False
-        self._updates = self._late = self._reported = 0
-        self._worst = 0
+        self._updates = self._worst = self.late = 0
 
     def begin(self) -> None:
         self._has_begun = True
@@ -43,26 +41,19 @@ class Lateness:
         """The update of the instant ``due`` has ended. Instants between the last one and this were skipped, so late."""
         skipped = round((due - self._last) / self._period) - 1 if self._last is not None and self._period else 0
         self._last = due
-        if not self._has_begun:
-            return
-        late = ended - due
-        self._updates += 1 + max(skipped, 0)
-        self._late += (late > self._late_after) + max(skipped, 0)
-        self._worst = max(self._worst, late)
+        if self._has_begun:
+            self._updates += 1 + max(skipped, 0)
+            self.late += (ended - due > self._late_after) + max(skipped, 0)
+            self._worst = max(self._worst, ended - due)
 
-    def news(self) -> dict[str, int | float] | None:
-        """What is to report, when more were late than at the last report."""
-        if self._late == self._reported:
-            return None
-        self._reported = self._late
-        return {"updates": self._updates, "late": self._late, "worst_s": round(self._worst / MICROSECONDS, 3)}
+    def facts(self) -> dict[str, int | float]:
+        return {"updates": self._updates, "late": self.late, "worst_s": round(self._worst / MICROSECONDS, 3)}
 
 
 TEST_BEGIN = "dodo.TestBegin"
 REPORT_PERIOD = 1_000_000
 
 _log = logging.getLogger(__name__)
-_warn_once = functools.cache(_log.warning)
 
 
 @dataclass
@@ -86,8 +77,8 @@ class Loop:
     _heard: Counter[tuple[int, int]] = field(default_factory=Counter)
     _unusable: set[tuple[int, int]] = field(default_factory=set)
     _began: int | None = None
-    _reported: int = 0
-    _paused: float = 0.0
+    _reported: tuple[int, int, float] = (0, 0, 0.0)
+    """Messages lost, updates late and seconds paused, as they were reported last."""
     _report_after: int = 0
     _lateness: Lateness = field(init=False)
     _world: World = field(init=False)
@@ -122,10 +113,6 @@ class Loop:
         self.clock.close(stopped if self._began is not None else lambda: True)
         self._tell_strangers()
         self._report(self.clock.now())
-        if self.session.lost:
-            _log.warning("%d messages were lost: the receive buffer was full", self.session.lost)
-        if self.session.garbage:
-            _log.debug("%d datagrams held no message", self.session.garbage)
 
     def _run(self, stopped: Callable[[], bool]) -> None:
         service = self.service
@@ -191,7 +178,7 @@ class Loop:
                 try:
                     message = decode(layout, envelope.payload)
                 except MessageError as error:
-                    _warn_once("message %d of sender %d: %s", envelope.data_type, envelope.sender_stamp, str(error))
+                    self._ignore(envelope, error)
                     return
                 if self.members is not None:
                     began, arrived = self._began, self.service.arrived
@@ -200,9 +187,13 @@ class Loop:
                 try:
                     handler(message, envelope.sample_time)
                 except UnusableMessageError as error:
-                    if (key := (envelope.data_type, envelope.sender_stamp)) not in self._unusable:
-                        self._unusable.add(key)
-                        _log.warning("ignored this and all such %s/%d: %s", type(message).__name__, key[1], error)
+                    self._ignore(envelope, error)
+
+    def _ignore(self, envelope: Envelope, error: Exception) -> None:
+        if (key := (envelope.data_type, envelope.sender_stamp)) not in self._unusable:
+            self._unusable.add(key)
+            name = self.session.messages.name(envelope.data_type)
+            _log.warning("ignored this and all such %s/%d: %s", name, envelope.sender_stamp, error)
 
     def strangers(self) -> list[str]:
         """A sentence for each input that never came, while others of its type did: that is easily taken for silence."""
@@ -225,15 +216,18 @@ class Loop:
             tell("note", text=text)
 
     def _report(self, now: int) -> None:
-        if self.session.lost > self._reported:
-            self._reported, self._report_after = self.session.lost, now + REPORT_PERIOD
-            tell("lost", messages=self._reported)
-        if (late := self._lateness.news()) is not None:
-            self._report_after = now + REPORT_PERIOD
-            tell("late", **late)
-        if self.service.paused > self._paused:
-            self._paused, self._report_after = self.service.paused, now + REPORT_PERIOD
-            tell("paused", seconds=round(self._paused, 3))
+        """What has gone on since the last report."""
+        session, lateness, paused = self.session, self._lateness, self.service.paused
+        if (session.lost, lateness.late, paused) == self._reported:
+            return
+        lost, late, was_paused = self._reported
+        self._reported, self._report_after = (session.lost, lateness.late, paused), now + REPORT_PERIOD
+        if session.lost > lost:
+            tell("lost", messages=session.lost)
+        if lateness.late > late:
+            tell("late", **lateness.facts())
+        if paused > was_paused:
+            tell("paused", seconds=round(paused, 3))
 
     def _send(self, output: Message | Output | Envelope | list[Framed], now: int) -> None:
         if not isinstance(output, list):

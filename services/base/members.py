@@ -3,10 +3,9 @@
 import math
 import os
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Self
+from typing import NamedTuple, Self
 
 from google.protobuf.message import Message
 
@@ -18,6 +17,9 @@ from dodo_dsl.opendlv.session import Session
 from services.base.clock import MICROSECONDS
 from services.base.runner import tell
 
+Key = tuple[int, int | None]
+"""Id and sender stamp of a message; None is any stamp."""
+
 VARIABLE = "DODO_SENDERS"
 """Environment variable with words such as ``opendlv.sim.Frame/0=pose``; no service behind ``=``: nobody may send it.
 
@@ -28,8 +30,7 @@ RUNNER_ONLY = {"dodo.TestBegin": RUNNER, "dodo.LinesRead": RUNNER, "dodo.Alive":
 """Messages of the runner, with the name of the address from which they come."""
 
 
-@dataclass(frozen=True)
-class Producers:
+class Producers(NamedTuple):
     """The ``services`` that alone may send a message; ``silent`` are those that may not say from where."""
 
     message: str
@@ -41,46 +42,52 @@ class Producers:
         """Why a test fails in which the application sent the message."""
         if self.services == (LINES,):
             return f"the application sent {self.message}, which it declares to print (x-dodo: lines)"
-        *others, last = [f"'{name}'" for name in self.services] or [""]
-        only = f"{', '.join(others)} and {last}" if others else last
+        only = " and ".join(f"'{name}'" for name in self.services)
         who = f"only {only} may send" if only else "no service of this test sends"
         return f"the application sent {self.message}, which {who}"
 
 
-@dataclass
 class SenderTable:
     """The producers by message; reports, once for each message, that the application has sent one of theirs."""
 
-    messages: MessageSet
-    by_message: dict[tuple[int, int | None], Producers] = field(default_factory=dict)
-    book: AddressBook = field(default_factory=lambda: AddressBook(channel()))
-    _reported: set[str] = field(default_factory=set)
-    _of_runner: dict[int, str] = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._of_runner = {self.messages.id(name): name for name in RUNNER_ONLY}
+    def __init__(
+        self, messages: MessageSet, by_message: Mapping[Key, Producers] | None = None, book: AddressBook | None = None
+    ) -> None:
+        self.by_message = by_message or {}
+        self.book = book or AddressBook(channel())
+        self._of_runner = {messages.id(name): name for name in RUNNER_ONLY}
+        self._reported: set[str] = set()
+        self.ids = frozenset([*self._of_runner, *(id_ for id_, _ in self.by_message)])
+        """Of all messages that not everybody may send."""
 
     @classmethod
     def load(cls, messages: MessageSet) -> Self:
         """The table that the environment names, empty without one; raises ValueError for words that make none."""
-        return cls(messages, dict(_entries(os.environ.get(VARIABLE, ""), messages)))
-
-    @property
-    def ids(self) -> frozenset[int]:
-        return frozenset([*self._of_runner, *(id_ for id_, _ in self.by_message)])
+        table: dict[Key, Producers] = {}
+        for word in os.environ.get(VARIABLE, "").split():
+            message, _, names = word.partition("=")
+            written = [name for name in names.split(",") if name]
+            silent = frozenset(name.removesuffix("?") for name in written if name.endswith("?"))
+            producers = Producers(message, tuple(name.removesuffix("?") for name in written), silent)
+            table[messages.key(message)] = producers
+            if message == END_OF_INPUT:  # the same services show what may be answered
+                table[messages.key(NOT_SHOWN)] = producers._replace(message=NOT_SHOWN)
+        return cls(messages, table)
 
     def producers(self, envelope: Envelope) -> Producers | None:
         """Those of a message; None for one that anybody may send."""
-        of_stamp = self.by_message.get((envelope.data_type, envelope.sender_stamp))
-        return of_stamp or self.by_message.get((envelope.data_type, None))
+        of_stamp, of_any = _keys_of(envelope)
+        return self.by_message.get(of_stamp) or self.by_message.get(of_any)
+
+    def address(self, name: str) -> Address | None:
+        """Of a service, or of the runner."""
+        self.book.read()
+        return self.book.addresses.get(name)
 
     def is_of_runner(self, envelope: Envelope, source: Address) -> bool:
         """Whether the runner sent a message that only it may send, True for all others; reports one that it did not."""
         name = self._of_runner.get(envelope.data_type)
-        if name is None:
-            return True
-        self.book.read()
-        if source == self.book.addresses.get(RUNNER_ONLY[name]):
+        if name is None or source == self.address(RUNNER_ONLY[name]):
             return True
         self.report(f"the application sent {name}, which only the runner may send")
         return False
@@ -110,18 +117,6 @@ def _infinite_number(message: Message, inside: str = "") -> str:
     return ""
 
 
-def _entries(text: str, messages: MessageSet) -> Iterator[tuple[tuple[int, int | None], Producers]]:
-    for word in text.split():
-        message, _, names = word.partition("=")
-        written = [each for each in names.split(",") if each]
-        silent = frozenset(each.removesuffix("?") for each in written if each.endswith("?"))
-        services = tuple(each.removesuffix("?") for each in written)
-        (key,) = _keys([message], messages)
-        yield key, Producers(message, services, silent)
-        if message == END_OF_INPUT:  # the same services show what may be answered
-            yield (messages.id(NOT_SHOWN), None), Producers(NOT_SHOWN, services, silent)
-
-
 WORLD_VARIABLE = "DODO_WORLD"
 """Environment variable with the names of the test's services, those of DoDo's own programs alone.
 
@@ -133,58 +128,41 @@ TRUTH = "DODO_TRUTH"
 TOLD = "DODO_TOLD"
 """Environment variable with the messages of the world that the application declares to take, and so gets."""
 
-Key = tuple[int, int | None]
-"""Id and sender stamp of a message; None is any stamp."""
 
+class World(NamedTuple):
+    """Messages of the world by id; without any, as outside of tests, nothing is kept from the bus.
 
-@dataclass(frozen=True)
-class World:
-    """The ``services`` of a test; without any, as outside of tests, nothing is kept from the bus.
-
-    ``silent`` are those that may not say where they listen, with what they consume. ``told`` are messages of the world
-    that the application gets, ``ids`` all others, ``names`` those of both; ``truth`` is what evaluators judge by.
+    ``silent`` are the services that may not say where they listen, with what they consume. ``told`` are messages of the
+    world that the application gets; ``truth`` is what evaluators judge by.
     """
 
-    services: frozenset[str] = frozenset()
-    silent: Mapping[str, frozenset[Key]] = field(default_factory=dict)
-    told: frozenset[Key] = frozenset()
-    truth: frozenset[Key] = frozenset()
-    ids: frozenset[int] = frozenset()
-    names: Mapping[int, str] = field(default_factory=dict)
+    names: Mapping[int, str]
+    silent: Mapping[str, frozenset[Key]]
+    told: frozenset[Key]
+    truth: frozenset[Key]
 
     @classmethod
     def load(cls, messages: MessageSet) -> Self:
         """What the environment names, empty without it; raises ValueError for words that make none."""
-        words = os.environ.get(WORLD_VARIABLE, "").split()
-        if not words and os.environ.get(TRUTH, "").split():
-            raise ValueError(
-                f"{TRUTH} names what the application must not get, and {WORLD_VARIABLE} no service that gets it"
-            )
-        if not words:
-            return cls()
-        entries = [word.partition("?=") for word in words]
-        silent = {name: _keys(written.split(","), messages) for name, mark, written in entries if mark}
-        names = {messages.id(name): name for name in messages.names() if is_of_the_world(name)}
-        told, truth = (_keys(os.environ.get(variable, "").split(), messages) for variable in (TOLD, TRUTH))
-        services = frozenset(name for name, mark, _ in entries if not mark)
-        return cls(services, silent, told, truth, frozenset(names), names)
 
-    def __bool__(self) -> bool:
-        return bool(self.services or self.silent)
+        def keys(words: Iterable[str]) -> frozenset[Key]:
+            return frozenset(messages.key(word) for word in words if word)
+
+        words = os.environ.get(WORLD_VARIABLE, "").split()
+        entries = [word.partition("?=") for word in words]
+        silent = {name: keys(written.split(",")) for name, mark, written in entries if mark}
+        names = {messages.id(name): name for name in messages.names() if is_of_the_world(name)} if words else {}
+        told, truth = (keys(os.environ.get(variable, "").split()) for variable in (TOLD, TRUTH))
+        return cls(names, silent, told, truth)
 
     def holds(self, envelope: Envelope) -> bool:
         """Whether a message must not come to the bus."""
         keys = _keys_of(envelope)
-        return not self.truth.isdisjoint(keys) or (envelope.data_type in self.ids and self.told.isdisjoint(keys))
+        return not self.truth.isdisjoint(keys) or (envelope.data_type in self.names and self.told.isdisjoint(keys))
 
     def awaited_by(self, envelope: Envelope) -> list[str]:
         """Those of the services that may not say where they listen who consume a message."""
         return [name for name, keys in self.silent.items() if not keys.isdisjoint(_keys_of(envelope))]
-
-
-def _keys(words: Iterable[str], messages: MessageSet) -> frozenset[Key]:
-    parts = (word.partition("/") for word in words if word)
-    return frozenset((messages.id(name), int(stamp) if stamp else None) for name, _, stamp in parts)
 
 
 def _keys_of(envelope: Envelope) -> tuple[Key, Key]:
@@ -198,9 +176,9 @@ _UNATTENDED_S = 10.0
 class Members:
     """Separates the messages of the test's services from the application's, and sends to them alone."""
 
-    def __init__(self, session: Session, name: str, table: SenderTable, world: World | None = None) -> None:
+    def __init__(self, session: Session, name: str, table: SenderTable, world: World) -> None:
         self._session, self._name, self._table, self._book = session, name, table, table.book
-        self._world = world or World()
+        self._world = world
         self._overheard: set[int] = set()
         """Messages of the world that had to come to the bus."""
         self._silent_from = time.monotonic() + _UNATTENDED_S

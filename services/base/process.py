@@ -165,7 +165,7 @@ def _bus_and_clock(
 def _membership(session: Session, role: str) -> Members | None:
     """The test's services in real time; in lockstep the clock knows them."""
     senders, world = SenderTable.load(session.messages), World.load(session.messages)
-    if os.environ.get("DODO_CLOCK") or not (senders.by_message or world):
+    if os.environ.get("DODO_CLOCK") or not (senders.by_message or world.names):
         return None
     return Members(session, role, senders, world)
 

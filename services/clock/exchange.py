@@ -77,7 +77,7 @@ class Exchange:
         envelope = self._session.receive(0.0)
         if envelope is None:
             return False
-        if not self._session.was_direct or self._session.source == self._runner():
+        if not self._session.was_direct or self._session.source == self._senders.address(RUNNER):
             self.hear(envelope, self._session.source)
         return True
 
@@ -85,14 +85,10 @@ class Exchange:
         """Take a message from the bus; the addresses of all services are known."""
         if source not in self._own and self._senders.is_of_runner(envelope, source):
             producers = self._senders.producers(envelope)
-            if producers is None or (LINES in producers.services and source == self._runner()):
+            if producers is None or (LINES in producers.services and source == self._senders.address(RUNNER)):
                 self._take_other(envelope)
             else:
                 self._senders.report(producers.reason)
-
-    def _runner(self) -> Address | None:
-        self._senders.book.read()
-        return self._senders.book.addresses.get(RUNNER)
 
     def close(self) -> None:
         self._listener.close()
