@@ -3,6 +3,7 @@
 import select
 import time
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 
 from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
@@ -14,6 +15,8 @@ from dodo_dsl.opendlv.session import Session
 from services.base.members import channel
 
 SLICE_S = 0.1
+_MOST = 10_000
+"""Messages that an observer takes before it looks at the clock again."""
 _MEANWHILE = 0.003
 """Seconds that an observer of the bus waits after a message, so that it wakes once for several."""
 
@@ -40,7 +43,7 @@ class ClockClient:
             self._session.deafen()
             return self._receive(SLICE_S)
         command = self._receive(0.0)
-        has_heard = self._drain(observe)
+        has_heard = self.drain(observe)
         if command is None:
             heard = [] if has_heard else [self._session.fileno()]
             select.select([self._channel.fileno(), *heard], [], [], _MEANWHILE if has_heard else SLICE_S)
@@ -61,10 +64,10 @@ class ClockClient:
         assert not isinstance(command, Done), "the clock gives commands"
         return command
 
-    def _drain(self, observe: Callable[[Envelope], None]) -> bool:
+    def drain(self, observe: Callable[[Envelope], None]) -> bool:
         """Take the bus: messages of services come with the steps, and the runner's begin, too."""
         has_heard = False
-        while (envelope := self._session.receive(0.0)) is not None:
+        for envelope in islice(iter(self._session.receive, None), _MOST):
             has_heard, source = True, self._session.source
             is_of_service = self._book.knows(source, envelope.received) and source not in (
                 self._book.addresses.get(RUNNER),

@@ -13,8 +13,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from fractions import Fraction
-from functools import partial
-from itertools import groupby, islice
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 from dodo_dsl.opendlv.channel import About, Done, Show, Step
@@ -76,7 +75,6 @@ EPOCH = 1_700_000_000_000_000
 LONGEST = 2 * 86_400_000_000
 """Longest test, in microseconds."""
 
-_MOST_LAST = 10_000
 RECORDED_STEP, RECORDING_END = "dodo.RecordedStep", "dodo.RecordingEnd"
 
 
@@ -163,8 +161,7 @@ class LockstepClock(Clock):
         self._about = About(self._address, len(self._memories), consumes)
         yield from self._steps(period, inbox, stopped)
         if inbox.observes:
-            for envelope in islice(iter(partial(inbox.receive, 0.0), None), _MOST_LAST):
-                self._observer.collect(envelope)
+            self._client.drain(self._observer.collect)
             self._observer.flush(inbox)
 
     def _steps(self, period: Fraction | int, inbox: "Loop", stopped: Callable[[], bool]) -> Iterator[int]:

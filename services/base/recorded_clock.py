@@ -33,6 +33,9 @@ class RecordedSteps(ClockClient):
             raise EOFError
         return step
 
+    def drain(self, observe: Callable[[Envelope], None]) -> bool:
+        return False
+
     def answer(self, done: Done) -> None:
         """Nobody waits for it."""
 
