@@ -9,15 +9,7 @@ from typing import Any
 from dodo_dsl.opendlv.channel import Done, Show
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
-from services.clock.exchange import (
-    PATIENCE,
-    WALL_FACTOR,
-    ApplicationFloods,
-    ApplicationSilent,
-    Exchange,
-    IsStopped,
-    Patience,
-)
+from services.clock.exchange import PATIENCE, WALL_FACTOR, ApplicationFails, Exchange, Patience
 
 MOST_SURPLUS = 100
 """Surplus messages of one kind to a frame; more of them are a flood that would keep others from the bus."""
@@ -72,7 +64,7 @@ class Answers:
         """Take a message from the bus.
 
         An answer counts by the frame's sample time. Where the application does not copy sample times, the first message
-        after the frame counts, and gets the frame's sample time. Raises ApplicationFloods.
+        after the frame counts, and gets the frame's sample time. Raises ApplicationFails.
         """
         if not self._times:
             return
@@ -99,7 +91,7 @@ class Answers:
         if self._surplus[each.name] > MOST_SURPLUS:
             message = each.name.rpartition(".")[2]
             sent = f"sent more than {MOST_SURPLUS} {message}s that nobody asked for"
-            raise ApplicationFloods(f"the application {sent} within a frame: it floods the bus")
+            raise ApplicationFails(f"the application {sent} within a frame: it floods the bus")
 
     @property
     def filters(self) -> tuple[MessageFilter, ...]:
@@ -129,17 +121,19 @@ def filters(names: Iterable[str], messages: MessageSet) -> tuple[MessageFilter, 
     return tuple(MessageFilter(text, *messages.key(text)) for text in names)
 
 
+@dataclass
 class AnsweringApplication:
     """Shows pictures to the application and waits for its answers; ``frames`` counts what was shown."""
 
-    def __init__(self, answers: Answers, link: Exchange, stopped: IsStopped, patience: Patience = PATIENCE) -> None:
-        self.answers = answers
-        self.frames = 0
-        self._patience, self._link, self._stopped = patience, link, stopped
-        self._began = 0.0
-        self._has_cameras = self._is_shown = False
-        self._reading: set[str] = set()
-        """Cameras whose readers do not wait for the next picture yet, where no message completes a frame."""
+    answers: Answers
+    link: Exchange
+    patience: Patience = PATIENCE
+    frames: int = 0
+    _began: float = 0.0
+    _has_cameras: bool = False
+    _is_shown: bool = False
+    _reading: set[str] = field(default_factory=set)
+    """Cameras whose readers do not wait for the next picture yet, where no message completes a frame."""
 
     def facts(self) -> dict[str, Any]:
         """Nothing is measured: what it waits for a processor is not known."""
@@ -152,12 +146,12 @@ class AnsweringApplication:
     def expect(self, now: int) -> None:
         """Without cameras, it answers what services are about to send in the step of this time (us)."""
         if not self._has_cameras:
-            self._link.drain()
+            self.link.drain()
             self.answers.expect([now])
             self.answers.seen()
 
     def show(self, shown: Sequence[Done], now: int) -> None:
-        """Announce new pictures as soon as readers wait for them; raises ApplicationSilent and ApplicationFloods."""
+        """Announce new pictures as soon as readers wait for them; raises ApplicationFails."""
         self._is_shown = bool(shown) or not self._has_cameras
         self.frames += self._is_shown
         self._began = time.monotonic()
@@ -166,30 +160,30 @@ class AnsweringApplication:
         for camera in shown:
             if not camera.awaited:
                 self._go(camera.service, Show(awaits=True, announces=False))
-            self._link.drain()  # what the application has sent before it can see the picture
+            self.link.drain()  # what the application has sent before it can see the picture
             self.answers.seen()
             self._go(camera.service, Show(awaits=False, announces=True))
         if not self.answers.is_expected:
             self._reading = {camera.service for camera in shown}
             for name in self._reading:
-                self._link.send(name, Show(awaits=True, announces=False))
+                self.link.send(name, Show(awaits=True, announces=False))
 
     def _go(self, camera: str, command: Show) -> None:
-        self._link.send(camera, command)
-        while self._link.result(camera) is None and not self._stopped():
+        self.link.send(camera, command)
+        while self.link.result(camera) is None and not self.link.stopped():
             self._pump([camera], f"no reader waited for a picture of '{camera}'")
 
     def await_answer(self, until: int) -> None:
-        """Wait for the answer to what was shown; raises ApplicationSilent and ApplicationFloods.
+        """Wait for the answer to what was shown; raises ApplicationFails.
 
         Where no message is one, it is there when the readers wait for the next picture.
         """
-        while self._is_shown and not self._stopped():
+        while self._is_shown and not self.link.stopped():
             if self.answers.is_expected:
                 missing = " and ".join(name.rpartition(".")[2] for name in self.answers.missing)
                 what = f"{missing} missing" if missing else ""
             else:
-                self._reading = {name for name in self._reading if self._link.result(name) is None}
+                self._reading = {name for name in self._reading if self.link.result(name) is None}
                 what = f"no reader waited for the next picture of '{min(self._reading)}'" if self._reading else ""
             if not what:
                 return
@@ -197,13 +191,13 @@ class AnsweringApplication:
 
     def _pump(self, cameras: Collection[str], what: str, *, silent: bool = False) -> None:
         """Take a message of the bus or an answer of a camera; ``what`` is missing when the time is over."""
-        limit = self._patience.first if self.frames == 1 else WALL_FACTOR * self._patience.others
+        limit = self.patience.first if self.frames == 1 else WALL_FACTOR * self.patience.others
         left = self._began + limit - time.monotonic()
         if left <= 0:
-            raise ApplicationSilent(
+            raise ApplicationFails(
                 f"the application did not answer frame {self.frames} within {limit:g} s ({what})", silent=silent
             )
-        self._link.pump(left, cameras)
+        self.link.pump(left, cameras)
 
     def collect(self) -> list[Envelope]:
         return self.answers.collect()

@@ -15,6 +15,35 @@ from dodo_dsl.opendlv.packets import Listener
 from dodo_dsl.opendlv.session import Session
 from services.base.members import SenderTable
 
+SLICE_S = 0.05
+"""How often the clock checks whether it has to stop."""
+START_PATIENCE = 240.0
+"""Wall time in s for all services to connect, as the clock begins while others still start: layer after layer."""
+SERVICE_PATIENCE = 60.0
+"""Wall time in s that services of the test have for a step; none takes nearly as long."""
+
+
+class TestEnded(Exception):
+    """The test cannot go on. ``kind`` names the reason; ``silent``: nothing came of the application."""
+
+    kind = ""
+
+    def __init__(self, reason: str = "", *, silent: bool = False) -> None:
+        super().__init__(reason)
+        self.silent = silent
+
+
+class ApplicationFails(TestEnded):
+    kind = "unanswered"
+
+
+class ServiceSilent(TestEnded):
+    kind = "stuck"
+
+
+class TimeOver(TestEnded):
+    kind = "timedout"
+
 
 class Exchange:
     """Commands the ``services``; messages of others on the bus go to ``take``, if ``senders`` let them send those."""
@@ -25,28 +54,44 @@ class Exchange:
         path: Path,
         services: Iterable[str],
         take: Callable[[Envelope], None],
+        stopped: Callable[[], bool],
         senders: SenderTable | None = None,
     ) -> None:
-        """Raises OSError."""
+        """``stopped`` says whether the test is over, and nothing is to be awaited any more. Raises OSError."""
+        self.stopped = stopped
         self._session, self._take_other = session, take
         self._senders = senders or SenderTable(session.messages)
         self._listener = Listener(path, services)
         self._channels: dict[str, Channel] = {}
         self._own: set[Address] = set()
 
-    def connect(self, patience: float, stopped: "IsStopped") -> None:
-        """Wait until all services are there, at most ``patience`` s of wall time; raises ServiceSilent."""
-        end = time.monotonic() + patience
-        while self._listener.missing and not stopped():
+    def connect(self) -> None:
+        """Wait until all services are there; raises ServiceSilent."""
+        end = time.monotonic() + START_PATIENCE
+        while self._listener.missing and not self.stopped():
             if accepted := self._listener.accept(SLICE_S):
                 self._channels[accepted[0]] = Channel(accepted[1])
             elif time.monotonic() > end:
-                raise ServiceSilent(f"service '{min(self._listener.missing)}' did not connect within {patience:g} s")
+                missing = min(self._listener.missing)
+                raise ServiceSilent(f"service '{missing}' did not connect to the clock within {START_PATIENCE:g} s")
 
     def send(self, service: str, command: Step | Show) -> None:
         """Command a service, which answers once."""
         if service in self._channels:
             self._channels[service].send(command)
+
+    def results(self, services: Iterable[str]) -> list[Done]:
+        """The answers of services, fewer where the test is over; raises ServiceSilent."""
+        found: list[Done] = []
+        end = time.monotonic() + SERVICE_PATIENCE
+        for name in services:
+            while (done := self.result(name, SLICE_S)) is None:
+                if self.stopped():
+                    return found
+                if time.monotonic() > end:
+                    raise ServiceSilent(f"service '{name}' did not answer the clock within {SERVICE_PATIENCE:g} s")
+            found.append(done)
+        return found
 
     def result(self, service: str, timeout: float = 0.0) -> Done | None:
         """A service's answer within ``timeout`` seconds."""
@@ -94,39 +139,6 @@ class Exchange:
         self._listener.close()
         for channel in self._channels.values():
             channel.close()
-
-
-SLICE_S = 0.05
-"""How often the clock checks whether it has to stop."""
-
-
-class TestEnded(Exception):
-    """The test cannot go on. ``kind`` names the reason; ``silent``: nothing came of the application."""
-
-    kind = ""
-
-    def __init__(self, reason: str = "", *, silent: bool = False) -> None:
-        super().__init__(reason)
-        self.silent = silent
-
-
-class ApplicationSilent(TestEnded):
-    kind = "unanswered"
-
-
-class ApplicationFloods(TestEnded):
-    kind = "unanswered"
-
-
-class ServiceSilent(TestEnded):
-    kind = "stuck"
-
-
-class TimeOver(TestEnded):
-    kind = "timedout"
-
-
-IsStopped = Callable[[], bool]
 
 
 @dataclass(frozen=True)

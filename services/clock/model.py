@@ -1,6 +1,5 @@
 """The order of a step: the action layer advances, the environment senses, the application answers, evaluators judge."""
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -9,24 +8,11 @@ from typing import TYPE_CHECKING
 from dodo_dsl.opendlv.channel import Done, Step
 from dodo_dsl.opendlv.envelope import Envelope
 from services.base.lockstep_clock import EPOCH
-from services.clock.exchange import (
-    SLICE_S,
-    ApplicationSilent,
-    Exchange,
-    IsStopped,
-    Roles,
-    ServiceSilent,
-    TimeOver,
-)
+from services.clock.exchange import ApplicationFails, Exchange, Roles, TimeOver
 
 if TYPE_CHECKING:
     from services.clock.answers import AnsweringApplication
     from services.clock.resting import RestingApplication
-
-SERVICE_PATIENCE = 60.0
-"""Wall time in s that a service of the test has for a step; none takes nearly as long."""
-START_PATIENCE = 240.0
-"""The same for all of them to connect, as the clock begins while others still start: layer after layer."""
 
 
 @dataclass
@@ -38,7 +24,6 @@ class Stepper:
     timeout: int
     application: "AnsweringApplication | RestingApplication"
     link: Exchange
-    stopped: IsStopped
     now: int = EPOCH
     reached: int = EPOCH
     """The last step that the evaluators have finished."""
@@ -55,20 +40,17 @@ class Stepper:
         return [name for name in self.roles.all if data_type in self._consumed.get(name, ())]
 
     def start(self) -> None:
-        """Find all services and what they consume, then let the application start until it rests.
-
-        Raises ApplicationSilent and ServiceSilent.
-        """
-        self.link.connect(START_PATIENCE, self.stopped)
+        """Find all services and what they consume, then let the application start until it rests; raises TestEnded."""
+        self.link.connect()
         self._backlog = {name: [] for name in self.roles.all}
         results = self._go(self.roles.all, EPOCH - 1)
         self._consumed = {r.service: frozenset(r.about.consumes) for r in results if r.about and r.about.consumes}
         self.application.start(self.now, {r.service for r in results if r.about and r.about.memories})
 
     def run(self, begin: Envelope) -> None:
-        """Until all evaluators have ended; raises ApplicationSilent, ServiceSilent and TimeOver."""
+        """Until all evaluators have ended; raises TestEnded."""
         self._deliver([begin._replace(sample_time=EPOCH, received=0)], "")
-        while not self.stopped():
+        while not self.link.stopped():
             self.application.expect(self.now)
             going = [done for name in (*self.roles.advance, *self.roles.sense) for done in self._go((name,), self.now)]
             if self._is_over():
@@ -97,10 +79,10 @@ class Stepper:
         self._send(self._watching, self.now)
 
     def _is_answered(self) -> bool:
-        """Wait for the answer; a missing one does not matter when the test is over. Raises ApplicationSilent."""
+        """Wait for the answer; a missing one does not matter when the test is over. Raises TestEnded."""
         try:
             self.application.await_answer(round(self._following()))
-        except ApplicationSilent:
+        except ApplicationFails:
             if not self._is_over():
                 raise
             return False
@@ -128,16 +110,9 @@ class Stepper:
             self.link.send(name, Step(until, messages))
 
     def _await(self, names: Sequence[str]) -> list[Done]:
-        results: list[Done] = []
-        began = time.monotonic()
-        for name in names:
-            while (result := self.link.result(name, SLICE_S)) is None:
-                if self.stopped():
-                    return results
-                if time.monotonic() - began > SERVICE_PATIENCE:
-                    raise ServiceSilent(f"service '{name}' did not answer the clock within {SERVICE_PATIENCE:g} s")
+        results = self.link.results(names)
+        for result in results:
             self._take(result)
-            results.append(result)
         return results
 
     def _take(self, result: Done) -> None:

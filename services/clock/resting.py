@@ -15,23 +15,13 @@ from dodo_dsl.opendlv.envelope import Envelope
 from services.base.runner import tell
 from services.clock.agent import Busy, Report, TimeAgent
 from services.clock.answers import MessageFilter
-from services.clock.exchange import (
-    PATIENCE,
-    SLICE_S,
-    WALL_FACTOR,
-    ApplicationFloods,
-    ApplicationSilent,
-    Exchange,
-    IsStopped,
-    Patience,
-    ServiceSilent,
-)
+from services.clock.exchange import PATIENCE, SLICE_S, WALL_FACTOR, ApplicationFails, Exchange, Patience, ServiceSilent
 from services.clock.printed_lines import PrintedLines
 
 MOST_SENT = 1000
 """Messages of one kind in a step; more of them are a flood."""
 PATIENCE_S = 60.0
-"""Wall time in s for an application that goes on without reaching the time, and for a camera."""
+"""Wall time in s for an application that goes on without reaching the time."""
 EXPOSED_US = 1
 """How long after its sample time a picture is shown, so that the time of now is none of a picture."""
 GONE_S = 1.0
@@ -52,7 +42,7 @@ class SentMessages:
     def __init__(self, filters: Sequence[MessageFilter]) -> None:
         self.filters = filters
         self.answers = self.uncopied = 0
-        self._names = {each.data_type: each.name.partition("/")[0].rpartition(".")[2] for each in filters}
+        self.names = {each.data_type: each.name.partition("/")[0].rpartition(".")[2] for each in filters}
         self._frames: set[int] = set()
         self._sent: list[Envelope] = []
         self._counts = Counter[int]()
@@ -62,12 +52,12 @@ class SentMessages:
         self._frames = {*sampled}
 
     def take(self, envelope: Envelope) -> None:
-        """Take a message from the bus; raises ApplicationFloods."""
-        if (name := self._names.get(envelope.data_type)) is None:
+        """Take a message from the bus; raises ApplicationFails."""
+        if (name := self.names.get(envelope.data_type)) is None:
             return
         self._counts[envelope.data_type] += 1
         if self._counts[envelope.data_type] > MOST_SENT:
-            raise ApplicationFloods(
+            raise ApplicationFails(
                 f"the application sent more than {MOST_SENT} {name}s within a step: it floods the bus"
             )
         self._sent.append(envelope)
@@ -130,33 +120,30 @@ def processor_name() -> str:
     return found[1] if found else ""
 
 
+@dataclass
 class RestingApplication:
-    """Lets the application go on from step to step, and shows pictures when they are due; ``frames`` counts steps."""
+    """Lets the application go on from step to step, and shows pictures when they are due; ``frames`` counts steps.
 
-    def __init__(
-        self,
-        answers: SentMessages,
-        agent: TimeAgent,
-        link: Exchange,
-        stopped: IsStopped,
-        response: ResponseTimes,
-        names: Sequence[str] = (),
-        lines: PrintedLines | None = None,
-        patience: Patience = PATIENCE,
-    ) -> None:
-        """``names`` are those of its services; its ``lines`` are messages."""
-        self.answers, self.response = answers, response
-        self.frames = 0
-        self._agent, self._patience, self._link, self._stopped = agent, patience, link, stopped
-        self._names, self._lines = names, lines
-        self._noted: set[str] = set()
-        self._unread: set[str] = set()
-        """Cameras whose pictures nobody has waited for yet."""
-        self._held: list[str] = []
-        """Cameras with a picture that is to be shown."""
-        self._shown_at = self._until = 0
-        self._taken_s = 0.0
-        self._gone: frozenset[int] = frozenset()
+    ``names`` are those of its services; its ``lines`` are messages.
+    """
+
+    answers: SentMessages
+    agent: TimeAgent
+    link: Exchange
+    response: ResponseTimes
+    names: Sequence[str] = ()
+    lines: PrintedLines | None = None
+    patience: Patience = PATIENCE
+    frames: int = 0
+    _noted: set[str] = field(default_factory=set)
+    _unread: set[str] = field(default_factory=set)
+    """Cameras whose pictures nobody has waited for yet."""
+    _held: list[str] = field(default_factory=list)
+    """Cameras with a picture that is to be shown."""
+    _shown_at: int = 0
+    _until: int = 0
+    _taken_s: float = 0.0
+    _gone: frozenset[int] = frozenset()
 
     def facts(self) -> dict[str, Any]:
         for camera in sorted(self._unread if self.frames else ()):
@@ -165,7 +152,7 @@ class RestingApplication:
         return facts and {**facts, "uncopied": self.answers.uncopied}
 
     def start(self, now: int, cameras: Collection[str]) -> None:
-        """Let it start at a time (us), until it rests; raises ApplicationSilent and ServiceSilent."""
+        """Let it start at a time (us), until it rests; raises TestEnded."""
         self._unread = {*cameras}
         self._shown_at = now
         self._run(now)
@@ -176,8 +163,7 @@ class RestingApplication:
     def show(self, shown: Sequence[Done], now: int) -> None:
         """Let it take what services have sent by ``now`` (us), then show it new pictures, whether it waits or not.
 
-        The first picture of a camera is shown as soon as it waits for one. Raises ApplicationSilent, ApplicationFloods
-        and ServiceSilent.
+        The first picture of a camera is shown as soon as it waits for one. Raises TestEnded.
         """
         self.frames += 1
         self._shown_at, self._taken_s = now, 0.0
@@ -197,13 +183,13 @@ class RestingApplication:
 
     def _go(self, cameras: Sequence[str], command: Show) -> list[Done]:
         for camera in cameras:
-            self._link.send(camera, command)
-        return [done for camera in cameras if (done := self._result(camera)) is not None]
+            self.link.send(camera, command)
+        return self.link.results(cameras)
 
     def await_answer(self, until: int) -> None:
-        """Let it go on to ``until`` (us); raises ApplicationSilent, ApplicationFloods and ServiceSilent."""
+        """Let it go on to ``until`` (us); raises TestEnded."""
         self._until, now = until, self._shown_at
-        while self._held and (now := now + LOOK_US) < until and not self._stopped():
+        while self._held and (now := now + LOOK_US) < until and not self.link.stopped():
             self._run(now)
             self._announce()
         self._run(until)
@@ -216,31 +202,24 @@ class RestingApplication:
             self.response.add(self.frames, self._taken_s)
         return sent
 
-    def _result(self, camera: str) -> Done | None:
-        began = time.monotonic()
-        while (done := self._link.result(camera, SLICE_S)) is None and not self._stopped():
-            if time.monotonic() - began > PATIENCE_S:
-                raise ServiceSilent(f"service '{camera}' did not show its picture within {PATIENCE_S:g} s")
-        return done
-
     def _run(self, until: int) -> None:
         began = time.monotonic()
-        self._agent.run(until)
-        while not self._stopped():
-            report = self._agent.report(SLICE_S)
-            self._link.drain()
+        self.agent.run(until)
+        while not self.link.stopped():
+            report = self.agent.report(SLICE_S)
+            self.link.drain()
             if report is not None and self._has_reached(report, until, began):
                 break
             if time.monotonic() - began > max(PATIENCE_S, WALL_FACTOR * self._limit):
-                raise ApplicationSilent(
+                raise ApplicationFails(
                     f"the application did not come to {(until - self._shown_at) / 1e6:g} s "
                     f"of its own time within {time.monotonic() - began:.0f} s of wall time"
                 )
 
     def _has_reached(self, report: Report, until: int, began: float) -> bool:
-        """Whether it rests at this time; raises ApplicationSilent and ServiceSilent."""
+        """Whether it rests at this time; raises TestEnded."""
         if report.destroyed:
-            raise ApplicationSilent("the application destroyed the page that gives it the test's time")
+            raise ApplicationFails("the application destroyed the page that gives it the test's time")
         if report.busy is not None:
             self._refuse_busy(report.busy)
         if report.now is None:
@@ -252,47 +231,47 @@ class RestingApplication:
         if report.now < until * _NS:
             return False
         if not (has_lines := self._has_lines(until)):
-            self._agent.run(until)
+            self.agent.run(until)
         return has_lines
 
     def _await_runner(self, gone: frozenset[int]) -> None:
         """Where a service has ended, the runner says whether the test goes on, before more of it passes."""
         end = time.monotonic() + GONE_S * bool(gone - self._gone)
         self._gone |= gone
-        while time.monotonic() < end and not self._stopped():
+        while time.monotonic() < end and not self.link.stopped():
             time.sleep(SLICE_S)
 
     def _has_lines(self, until: int) -> bool:
         """Whether all that it has printed in this step is taken, and it still rests."""
         is_shown_next = self.frames > 0 and until in (self._shown_at, self._shown_at + EXPOSED_US)
-        return is_shown_next or self._lines is None or self._lines.are_complete(self._shown_at, self._link)
+        return is_shown_next or self.lines is None or self.lines.are_complete(self._shown_at, self.link)
 
     @property
     def _limit(self) -> float:
-        return self._patience.first if self.frames <= 1 else self._patience.others
+        return self.patience.first if self.frames <= 1 else self.patience.others
 
     def _refuse_busy(self, busy: Busy) -> None:
-        """Raises ApplicationSilent where a thread has computed, or not come to wait, for too long."""
+        """Raises ApplicationFails where a thread has computed, or not come to wait, for too long."""
         name, service = _printable(busy.name), self._name(busy.service)
         whose = f" of service '{service}'" if service else ""
         way_out = "in lockstep the test goes on only when all threads wait"
         if busy.processor_s > self._limit:
             woken = f"went on and waited again and again in {self._limit:g} s of computing, without its time going on"
             did = woken if busy.state == "W" else f"computed for {self._limit:g} s without waiting"
-            raise ApplicationSilent(f"thread '{name}'{whose} {did}; {way_out}")
+            raise ApplicationFails(f"thread '{name}'{whose} {did}; {way_out}")
         if busy.wall_s > WALL_FACTOR * self._limit:
             state = f" (state {_printable(busy.state)})" if busy.state else ""
-            raise ApplicationSilent(
+            raise ApplicationFails(
                 f"thread '{name}'{whose} did not wait within {WALL_FACTOR * self._limit:g} s of wall time{state}; "
                 f"{way_out}"
             )
 
     def _name(self, service: int) -> str:
-        return self._names[service] if 0 <= service < len(self._names) else ""
+        return self.names[service] if 0 <= service < len(self.names) else ""
 
     def _tell(self, report: Report) -> None:
         """Notes of the application's processes become the test's, each once; raises ServiceSilent."""
-        missing = [name for number, name in enumerate(self._names) if number not in report.services]
+        missing = [name for number, name in enumerate(self.names) if number not in report.services]
         if missing and not self.frames:
             raise ServiceSilent(
                 f"service '{missing[0]}' never loaded DoDo's clock, as statically linked programs do not: "

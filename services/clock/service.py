@@ -36,14 +36,14 @@ class ClockService(Service):
         self._session, flags = context.session, context.flags
         self._begin_id = self._session.messages.id(BEGIN)
         self._senders = SenderTable.load(context.messages)
-        self._lines = PrintedLines(self._session, self._over) if flags["prints"] else None
+        self._lines = PrintedLines(context.messages) if flags["prints"] else None
         roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
-        self._exchange = Exchange(self._session, socket_path(), roles.all, self._take, self._senders)
+        self._exchange = Exchange(self._session, socket_path(), roles.all, self._take, self._over, self._senders)
         self._application = self._application_of(context)
         self._answers = self._application.answers
         self._session.hear_only([*(each.data_type for each in self._answers.filters), *self._senders.ids])
         period, timeout = period_of(flags["freq"]), round(flags["timeout"] * MICROSECONDS)
-        self._stepper = Stepper(roles, period, timeout, self._application, self._exchange, self._over)
+        self._stepper = Stepper(roles, period, timeout, self._application, self._exchange)
         self._reported = self._begun = 0.0
         self._stopped: Callable[[], bool] = lambda: False
         self.drive = self._drive
@@ -55,13 +55,13 @@ class ClockService(Service):
         done = filters([flags["done"]], context.messages)[0] if flags["done"] else None
         answers = Answers(required, relayed, done)
         if not flags["time-folder"] or os.environ.get("DODO_ANSWERS"):
-            return AnsweringApplication(answers, self._exchange, self._over)
+            return AnsweringApplication(answers, self._exchange)
         agent = TimeAgent(Path(flags["time-folder"]))
         context.resources.callback(agent.close)
         agent.open()  # before an application could find it
         response = ResponseTimes(1 / flags["freq"], flags["max-response"])
         sent, names = SentMessages(answers.filters), flags["application"]
-        return RestingApplication(sent, agent, self._exchange, self._over, response, names, self._lines)
+        return RestingApplication(sent, agent, self._exchange, response, names, self._lines)
 
     def _drive(self, stopped: Callable[[], bool]) -> None:
         self._stopped = stopped

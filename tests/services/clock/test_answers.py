@@ -4,7 +4,7 @@ import pytest
 
 from dodo_dsl.opendlv.envelope import Envelope
 from services.clock.answers import MOST_SURPLUS, Answers, MessageFilter
-from services.clock.exchange import ApplicationFloods
+from services.clock.exchange import ApplicationFails
 
 STEER, PEDAL, BOX, READY = 1090, 1086, 1134, 1054
 FRAME, NEXT, ELSEWHEN = 1_000_000, 1_100_000, 77
@@ -95,7 +95,7 @@ def test_answers_under_another_stamp_are_no_answers_but_are_handed_on() -> None:
 
 def test_a_flood_is_far_more_than_one_surplus_message_to_a_frame() -> None:
     answers = answering(said(STEER, FRAME), *[said(STEER, FRAME)] * MOST_SURPLUS)
-    with pytest.raises(ApplicationFloods, match="more than 100 steers that nobody asked for"):
+    with pytest.raises(ApplicationFails, match="more than 100 steers that nobody asked for"):
         answers.take(said(STEER, FRAME))
     answers.expect([NEXT])
     answers.take(said(STEER, FRAME))

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from services.base.lockstep_clock import EPOCH, AnnouncedMemory
-from services.clock import model
-from services.clock.exchange import ApplicationSilent, Patience, ServiceSilent, TimeOver
+from services.clock import exchange
+from services.clock.exchange import ApplicationFails, Patience, ServiceSilent, TimeOver
 from services.clock.model import Stepper
 from tests.services.clock.toys import BOX, DRIVE, STEP, Filter, Mover, Toys, Watcher
 
@@ -101,7 +101,7 @@ def test_the_test_time_is_limited(toys: Toys) -> None:
 
 @pytest.mark.thorough
 def test_a_service_that_does_not_answer_is_named(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(model, "SERVICE_PATIENCE", 0.3)
+    monkeypatch.setattr(exchange, "SERVICE_PATIENCE", 0.3)
     gone = threading.Event()
 
     class Hangs(Mover):
@@ -126,7 +126,7 @@ def test_silence_is_named_with_frame_and_cause(
     toys: Toys, patience: Patience, manner: dict[str, Any], said: str
 ) -> None:
     toys.patience = patience
-    with pytest.raises(ApplicationSilent, match=re.escape(said)):
+    with pytest.raises(ApplicationFails, match=re.escape(said)):
         toys.run(toys.application(**manner))
 
 

@@ -21,7 +21,7 @@ from services.base.lockstep_clock import EPOCH
 from services.clock import resting
 from services.clock.agent import TimeAgent
 from services.clock.answers import filters
-from services.clock.exchange import ApplicationSilent, Exchange, Patience, ServiceSilent
+from services.clock.exchange import ApplicationFails, Exchange, Patience, ServiceSilent
 from services.clock.printed_lines import PrintedLines
 from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
 from tests.services.clock.toys import STEER, STEP, Toys
@@ -72,8 +72,11 @@ class Link:
     def send(self, service: str, command: Any) -> None:
         self.sent.append((service, command))
 
-    def result(self, service: str, timeout: float = 0.0) -> Any:
-        return service
+    def stopped(self) -> bool:
+        return False
+
+    def results(self, services: list[str]) -> Any:
+        return []
 
     def __getattr__(self, _name: str) -> Callable[..., None]:
         return lambda *_, **__: None
@@ -91,7 +94,7 @@ def application(
 ) -> RestingApplication:
     heard, known = sent or SentMessages(filters([STEER], MESSAGES)), cast(Exchange, link or Link())
     names, printed, patience = ("driver", "eye"), cast(PrintedLines, lines), Patience(0.4, 0.2)
-    return RestingApplication(heard, agent, known, lambda: False, ResponseTimes(), names, printed, patience)
+    return RestingApplication(heard, agent, known, ResponseTimes(), names, printed, patience)
 
 
 def test_messages_count_when_they_were_sent_and_no_later_than_now(tmp_path: Path) -> None:
@@ -151,7 +154,7 @@ def test_who_does_not_wait_is_named(tmp_path: Path, frame: int, report: dict[str
         if not sentence:
             drive()
             return
-        with pytest.raises(ApplicationSilent) as refused:
+        with pytest.raises(ApplicationFails) as refused:
             drive()
     assert sentence in str(refused.value)
 
@@ -187,7 +190,7 @@ def test_its_lines_are_of_the_test_from_the_start_on(tmp_path: Path) -> None:
 
 def test_a_destroyed_page_fails_the_application_and_an_agent_that_ends_does_not(tmp_path: Path) -> None:
     with agent(tmp_path, lambda _: [{"destroyed": True}]) as time:
-        with pytest.raises(ApplicationSilent, match="the application destroyed the page"):
+        with pytest.raises(ApplicationFails, match="the application destroyed the page"):
             application(time).start(EPOCH, ())
         (tmp_path / "command").write_text("end\n")
         with pytest.raises(ServiceSilent, match="has ended"):
@@ -224,9 +227,9 @@ class Cameras(Link):
         super().__init__()
         self._awaited, self._asked = awaited, Counter[str]()
 
-    def result(self, service: str, timeout: float = 0.0) -> Any:
-        self._asked[service] += 1
-        return SimpleNamespace(service=service, awaited=self._asked[service] >= self._awaited[service])
+    def results(self, services: list[str]) -> Any:
+        self._asked.update(services)
+        return [SimpleNamespace(service=name, awaited=self._asked[name] >= self._awaited[name]) for name in services]
 
 
 def test_the_first_picture_of_a_camera_is_shown_when_the_application_waits_for_it(tmp_path: Path) -> None:

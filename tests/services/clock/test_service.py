@@ -16,7 +16,7 @@ from dodo_dsl.opendlv.session import Session
 from services.base import Context
 from services.base.flags import load_manifest, parse
 from services.base.members import Producers, SenderTable
-from services.clock import model
+from services.clock import exchange
 from services.clock.answers import Answers
 from services.clock.exchange import Exchange
 from services.clock.service import ClockService
@@ -44,8 +44,8 @@ def driven(session: Session, *flags: str, stopped: bool = False) -> None:
 def test_a_service_that_does_not_answer_is_reported(
     cid: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(model, "START_PATIENCE", 0.1)
-    reason = "service 'gone' did not connect within 0.1 s"
+    monkeypatch.setattr(exchange, "START_PATIENCE", 0.1)
+    reason = "service 'gone' did not connect to the clock within 0.1 s"
     with Session(cid) as session:
         driven(session, "--judge=gone")
     assert [json.loads(line) for line in capsys.readouterr().out.splitlines()] == [
@@ -103,13 +103,13 @@ def test_an_answer_that_is_printed_comes_from_the_runner_alone(
         table = {(ids[0], 0): Producers(f"{STEERING}/0", (LINES,)), (ids[1], 0): Producers("F", ("pose",))}
         taken: list[int] = []
         senders = SenderTable(session.messages, table, AddressBook(tmp_path))
-        exchange = Exchange(session, tmp_path / ".clock", (), lambda e: taken.append(e.sample_time), senders)
-        exchange.close()  # its bus stays
+        link = Exchange(session, tmp_path / ".clock", (), lambda e: taken.append(e.sample_time), lambda: False, senders)
+        link.close()  # its bus stays
         address_book.enter(tmp_path, "dodo-runner", runner)
-        exchange.hear(Envelope(ids[0], b"", 1, 0, 5, 0), runner)
+        link.hear(Envelope(ids[0], b"", 1, 0, 5, 0), runner)
         assert (taken, capsys.readouterr().out) == ([5], "")
-        exchange.hear(Envelope(ids[0], b"", 1, 0, 6, 0), other)
-        exchange.hear(Envelope(ids[1], b"", 1, 0, 7, 0), runner)
+        link.hear(Envelope(ids[0], b"", 1, 0, 6, 0), other)
+        link.hear(Envelope(ids[1], b"", 1, 0, 7, 0), runner)
     assert taken == [5]
     assert [json.loads(line)["reason"] for line in capsys.readouterr().out.splitlines()] == [
         f"the application sent {STEERING}/0, which it declares to print (x-dodo: lines)",

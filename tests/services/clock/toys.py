@@ -20,7 +20,7 @@ from services.base.lockstep_clock import EPOCH, LockstepClock
 from services.base.loop import Loop
 from services.clock.agent import TimeAgent
 from services.clock.answers import AnsweringApplication, Answers, filters
-from services.clock.exchange import Exchange, IsStopped, Patience, Roles
+from services.clock.exchange import Exchange, Patience, Roles
 from services.clock.model import Stepper
 from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
 
@@ -223,12 +223,12 @@ class Toys:
                 answers: Answers | SentMessages = Answers(required, relayed)
                 if self.agent:
                     answers = SentMessages(answers.filters)
-                exchange = resources.enter_context(closing(Exchange(session, path, makers, answers.take)))
+                exchange = resources.enter_context(closing(Exchange(session, path, makers, answers.take, stop.is_set)))
                 advance = tuple(name for name in self.cast if name == "mover")
                 sense = tuple(name for name in self.cast if name not in (*advance, *self.watch))
                 roles = Roles(advance, sense, ("judge",), self.watch)
-                application = self._under_test(answers, exchange, stop.is_set)
-                stepper = Stepper(roles, STEP, self.timeout, application, exchange, stop.is_set)
+                application = self._under_test(answers, exchange)
+                stepper = Stepper(roles, STEP, self.timeout, application, exchange)
                 with self._services(stop, makers, path):
                     for app in apps:
                         app.start()
@@ -240,10 +240,10 @@ class Toys:
                 app.join()
         return self.evaluator.path, stepper
 
-    def _under_test(self, answers: Any, link: Exchange, stopped: IsStopped) -> Any:
+    def _under_test(self, answers: Any, link: Exchange) -> Any:
         if self.agent:
-            return RestingApplication(answers, self.agent, link, stopped, ResponseTimes(), ("toy",))
-        return AnsweringApplication(answers, link, stopped, self.patience)
+            return RestingApplication(answers, self.agent, link, ResponseTimes(), ("toy",))
+        return AnsweringApplication(answers, link, self.patience)
 
     @contextmanager
     def _services(self, stop: threading.Event, makers: dict[str, Maker], path: Path) -> Iterator[None]:
