@@ -1,4 +1,4 @@
-"""What an evaluator judged over time, for the report to draw, as lines of JSON below 64 KiB; it decides nothing."""
+"""What an evaluator judged over time, for the report to draw, as lines of JSON; it decides nothing."""
 
 import base64
 import json
@@ -15,8 +15,7 @@ MOST_BOXES = 60_000
 """Of all frames together: frames after these are left out."""
 FINE, WARNED, FAILED = 0, 1, 2
 
-_PART, _BOXES_OF_A_LINE, _MOST_TEXT, _FARTHEST = 2000, 60, 60, 100.0
-_DIGITS = 4
+_PART, _MOST_TEXT, _FARTHEST, _DIGITS = 2000, 60, 100.0, 4
 
 LabelledArea = tuple[str, float, float, float, float]
 """Class, left, top, width and height; fractions of the picture."""
@@ -81,14 +80,12 @@ class Series:
 
     def _mark(self, value: float, target: float | None) -> int:
         away = 0.0 if target is None else abs(value - target)
-        if not math.isfinite(value) or self._is_beyond(value) or (self.distance is not None and away > self.distance):
+        is_beyond = (self.low is not None and value < self.low) or (self.high is not None and value > self.high)
+        is_at_limit = self.exclusive and value in (self.low, self.high)
+        is_far = self.distance is not None and away > self.distance
+        if not math.isfinite(value) or is_beyond or is_at_limit or is_far:
             return FAILED
         return WARNED if self.band is not None and away > self.band else FINE
-
-    def _is_beyond(self, value: float) -> bool:
-        if self.exclusive and value in (self.low, self.high):
-            return True
-        return (self.low is not None and value < self.low) or (self.high is not None and value > self.high)
 
     def _thin(self) -> None:
         """Of four neighbours the lowest and the highest stay, but one that failed before others."""
@@ -175,8 +172,7 @@ class Judged:
     def _frame_lines(self) -> Iterator[dict[str, Any]]:
         for time, boxes in self._frames:
             listed = [[kind, *each] for kind in ("hit", "false", "missed") for each in _shown(getattr(boxes, kind))]
-            for begin in range(0, max(len(listed), 1), _BOXES_OF_A_LINE):
-                yield {"frames": [[time, boxes.is_known, listed[begin : begin + _BOXES_OF_A_LINE]]]}
+            yield {"frames": [[time, boxes.is_known, listed]]}
         if self._is_cut:
             yield {"frames": [], "cut": MOST_BOXES}
 

@@ -20,28 +20,18 @@ class PolledMemory:
     s, for its lock.
     """
 
-    def __init__(
-        self,
-        name: str,
-        patience: float,
-        attach: Callable[[str], SharedMemory] | None = None,
-        is_first_taken: bool = False,
-    ) -> None:
+    def __init__(self, name: str, patience: float, is_first_taken: bool = False) -> None:
         self.name, self.last = name, 0
-        self._patience, self._attach, self._is_first_taken = patience, attach or SharedMemory.attach, is_first_taken
+        self._patience, self._is_first_taken = patience, is_first_taken
         self._memory: SharedMemory | None = None
         self._retry, self._is_known = 0, False
-
-    @property
-    def size(self) -> int:
-        return self._memory.size if self._memory else 0
 
     def poll(self, now: int, take: Callable[[SharedMemory, int], Found | None]) -> Found | None:
         """What ``take`` makes of the locked memory and its sample time, in us as ``now``; None if it cannot be had."""
         if self._memory is None and now < self._retry:
             return None
         try:
-            memory = self._memory = self._memory or self._attach(self.name)
+            memory = self._memory = self._memory or SharedMemory.attach(self.name)
             with memory.lock(self._patience):
                 time = memory.sample_time()
                 if not self._is_known:

@@ -3,7 +3,6 @@
 import functools
 import logging
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -66,14 +65,8 @@ class PictureSource(PolledMemory):
     In lockstep (``is_stepped``) what is in it at first is a picture if it has a sample time of the test.
     """
 
-    def __init__(
-        self,
-        spec: MemorySpec,
-        period: int,
-        attach: Callable[[str], SharedMemory] | None = None,
-        is_stepped: bool = False,
-    ) -> None:
-        super().__init__(spec.name, STEPPED_PATIENCE if is_stepped else PATIENCE, attach, is_first_taken=is_stepped)
+    def __init__(self, spec: MemorySpec, period: int, is_stepped: bool = False) -> None:
+        super().__init__(spec.name, STEPPED_PATIENCE if is_stepped else PATIENCE, is_first_taken=is_stepped)
         self.spec = spec
         self._is_stepped, self._period = is_stepped, period
         self._due: int | None = None
