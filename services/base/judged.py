@@ -1,4 +1,4 @@
-"""What an evaluator judged over time, for the report to draw, as lines of JSON; it decides nothing."""
+"""What an evaluator judged over time, for the report to draw, as lines of JSON below 64 KiB; it decides nothing."""
 
 import base64
 import json
@@ -15,7 +15,8 @@ MOST_BOXES = 60_000
 """Of all frames together: frames after these are left out."""
 FINE, WARNED, FAILED = 0, 1, 2
 
-_PART, _MOST_TEXT, _FARTHEST, _DIGITS = 2000, 60, 100.0, 4
+_PART, _BOXES_OF_A_LINE, _MOST_TEXT, _FARTHEST = 2000, 60, 60, 100.0
+_DIGITS = 4
 
 LabelledArea = tuple[str, float, float, float, float]
 """Class, left, top, width and height; fractions of the picture."""
@@ -172,7 +173,8 @@ class Judged:
     def _frame_lines(self) -> Iterator[dict[str, Any]]:
         for time, boxes in self._frames:
             listed = [[kind, *each] for kind in ("hit", "false", "missed") for each in _shown(getattr(boxes, kind))]
-            yield {"frames": [[time, boxes.is_known, listed]]}
+            for begin in range(0, max(len(listed), 1), _BOXES_OF_A_LINE):
+                yield {"frames": [[time, boxes.is_known, listed[begin : begin + _BOXES_OF_A_LINE]]]}
         if self._is_cut:
             yield {"frames": [], "cut": MOST_BOXES}
 
