@@ -97,7 +97,7 @@ class Loop:
             expected = "expected microseconds, 1 or more: period_of(freq) gives them"
             raise ValueError(f"the period of {type(self.service).__name__} is {period}, {expected}")
         self._lateness = Lateness(self.service.period, self.service.late_after)
-        self._world = World.load(self.session.messages)
+        self._world = World(self.session.messages)
 
     def run(self, stopped: Callable[[], bool]) -> None:
         """Until the service is done, or ``stopped``; memories of a source stay until all have judged."""

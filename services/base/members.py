@@ -3,9 +3,9 @@
 import math
 import os
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 from google.protobuf.message import Message
 
@@ -50,29 +50,22 @@ class Producers(NamedTuple):
 class SenderTable:
     """The producers by message; reports, once for each message, that the application has sent one of theirs."""
 
-    def __init__(
-        self, messages: MessageSet, by_message: Mapping[Key, Producers] | None = None, book: AddressBook | None = None
-    ) -> None:
-        self.by_message = by_message or {}
-        self.book = book or AddressBook(channel())
+    def __init__(self, messages: MessageSet) -> None:
+        """The table that the environment names, empty without one; raises ValueError for words that make none."""
+        self.by_message: dict[Key, Producers] = {}
+        self.book = AddressBook(channel())
         self._of_runner = {messages.id(name): name for name in RUNNER_ONLY}
         self._reported: set[str] = set()
-        self.ids = frozenset([*self._of_runner, *(id_ for id_, _ in self.by_message)])
-        """Of all messages that not everybody may send."""
-
-    @classmethod
-    def load(cls, messages: MessageSet) -> Self:
-        """The table that the environment names, empty without one; raises ValueError for words that make none."""
-        table: dict[Key, Producers] = {}
         for word in os.environ.get(VARIABLE, "").split():
             message, _, names = word.partition("=")
             written = [name for name in names.split(",") if name]
             silent = frozenset(name.removesuffix("?") for name in written if name.endswith("?"))
             producers = Producers(message, tuple(name.removesuffix("?") for name in written), silent)
-            table[messages.key(message)] = producers
+            self.by_message[messages.key(message)] = producers
             if message == END_OF_INPUT:  # the same services show what may be answered
-                table[messages.key(NOT_SHOWN)] = producers._replace(message=NOT_SHOWN)
-        return cls(messages, table)
+                self.by_message[messages.key(NOT_SHOWN)] = producers._replace(message=NOT_SHOWN)
+        self.ids = frozenset([*self._of_runner, *(id_ for id_, _ in self.by_message)])
+        """Of all messages that not everybody may send."""
 
     def producers(self, envelope: Envelope) -> Producers | None:
         """Those of a message; None for one that anybody may send."""
@@ -129,20 +122,14 @@ TOLD = "DODO_TOLD"
 """Environment variable with the messages of the world that the application declares to take, and so gets."""
 
 
-class World(NamedTuple):
+class World:
     """Messages of the world by id; without any, as outside of tests, nothing is kept from the bus.
 
     ``silent`` are the services that may not say where they listen, with what they consume. ``told`` are messages of the
     world that the application gets; ``truth`` is what evaluators judge by.
     """
 
-    names: Mapping[int, str]
-    silent: Mapping[str, frozenset[Key]]
-    told: frozenset[Key]
-    truth: frozenset[Key]
-
-    @classmethod
-    def load(cls, messages: MessageSet) -> Self:
+    def __init__(self, messages: MessageSet) -> None:
         """What the environment names, empty without it; raises ValueError for words that make none."""
 
         def keys(words: Iterable[str]) -> frozenset[Key]:
@@ -150,10 +137,9 @@ class World(NamedTuple):
 
         words = os.environ.get(WORLD_VARIABLE, "").split()
         entries = [word.partition("?=") for word in words]
-        silent = {name: keys(written.split(",")) for name, mark, written in entries if mark}
-        names = {messages.id(name): name for name in messages.names() if is_of_the_world(name)} if words else {}
-        told, truth = (keys(os.environ.get(variable, "").split()) for variable in (TOLD, TRUTH))
-        return cls(names, silent, told, truth)
+        self.silent = {name: keys(written.split(",")) for name, mark, written in entries if mark}
+        self.names = {messages.id(name): name for name in messages.names() if is_of_the_world(name)} if words else {}
+        self.told, self.truth = (keys(os.environ.get(variable, "").split()) for variable in (TOLD, TRUTH))
 
     def holds(self, envelope: Envelope) -> bool:
         """Whether a message must not come to the bus."""

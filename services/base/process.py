@@ -164,7 +164,7 @@ def _bus_and_clock(
 
 def _membership(session: Session, role: str) -> Members | None:
     """The test's services in real time; in lockstep the clock knows them."""
-    senders, world = SenderTable.load(session.messages), World.load(session.messages)
+    senders, world = SenderTable(session.messages), World(session.messages)
     if os.environ.get("DODO_CLOCK") or not (senders.by_message or world.names):
         return None
     return Members(session, role, senders, world)

@@ -55,12 +55,12 @@ class Exchange:
         services: Iterable[str],
         take: Callable[[Envelope], None],
         stopped: Callable[[], bool],
-        senders: SenderTable | None = None,
+        senders: SenderTable,
     ) -> None:
         """``stopped`` says whether the test is over, and nothing is to be awaited any more. Raises OSError."""
         self.stopped = stopped
         self._session, self._take_other = session, take
-        self._senders = senders or SenderTable(session.messages)
+        self._senders = senders
         self._listener = Listener(path, services)
         self._channels: dict[str, Channel] = {}
         self._own: set[Address] = set()

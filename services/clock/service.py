@@ -35,7 +35,7 @@ class ClockService(Service):
         assert context.session is not None, "the program gives its session"
         self._session, flags = context.session, context.flags
         self._begin_id = self._session.messages.id(BEGIN)
-        self._senders = SenderTable.load(context.messages)
+        self._senders = SenderTable(context.messages)
         self._lines = PrintedLines(context.messages) if flags["prints"] else None
         roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
         self._exchange = Exchange(self._session, socket_path(), roles.all, self._take, self._over, self._senders)

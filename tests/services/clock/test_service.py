@@ -8,14 +8,13 @@ from typing import cast
 import pytest
 
 from dodo_dsl.opendlv import address_book
-from dodo_dsl.opendlv.address import CHANNEL_VARIABLE, LINES
-from dodo_dsl.opendlv.address_book import AddressBook
+from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from services.base import Context
 from services.base.flags import load_manifest, parse
-from services.base.members import Producers, SenderTable
+from services.base.members import VARIABLE, SenderTable
 from services.clock import exchange
 from services.clock.answers import Answers
 from services.clock.exchange import Exchange
@@ -95,14 +94,14 @@ STEERING, PEDAL = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPos
 
 
 def test_an_answer_that_is_printed_comes_from_the_runner_alone(
-    cid: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    cid: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     runner, other = ("10.0.0.1", 40_000), ("10.0.0.1", 40_001)
     with Session(cid) as session:
         ids = session.messages.id(STEERING), session.messages.id("opendlv.sim.Frame")
-        table = {(ids[0], 0): Producers(f"{STEERING}/0", (LINES,)), (ids[1], 0): Producers("F", ("pose",))}
+        monkeypatch.setenv(VARIABLE, f"{STEERING}/0=dodo-lines opendlv.sim.Frame/0=pose")
         taken: list[int] = []
-        senders = SenderTable(session.messages, table, AddressBook(tmp_path))
+        senders = SenderTable(session.messages)
         link = Exchange(session, tmp_path / ".clock", (), lambda e: taken.append(e.sample_time), lambda: False, senders)
         link.close()  # its bus stays
         address_book.enter(tmp_path, "dodo-runner", runner)
@@ -113,7 +112,7 @@ def test_an_answer_that_is_printed_comes_from_the_runner_alone(
     assert taken == [5]
     assert [json.loads(line)["reason"] for line in capsys.readouterr().out.splitlines()] == [
         f"the application sent {STEERING}/0, which it declares to print (x-dodo: lines)",
-        "the application sent F, which only 'pose' may send",
+        "the application sent opendlv.sim.Frame/0, which only 'pose' may send",
     ]
 
 

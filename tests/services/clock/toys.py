@@ -18,6 +18,7 @@ from services.base import Service, Verdict
 from services.base.clock_link import ClockClient
 from services.base.lockstep_clock import EPOCH, LockstepClock
 from services.base.loop import Loop
+from services.base.members import SenderTable
 from services.clock.agent import TimeAgent
 from services.clock.answers import AnsweringApplication, Answers, filters
 from services.clock.exchange import Exchange, Patience, Roles
@@ -223,7 +224,9 @@ class Toys:
                 answers: Answers | SentMessages = Answers(required, relayed)
                 if self.agent:
                     answers = SentMessages(answers.filters)
-                exchange = resources.enter_context(closing(Exchange(session, path, makers, answers.take, stop.is_set)))
+                senders = SenderTable(messages)
+                link = Exchange(session, path, makers, answers.take, stop.is_set, senders)
+                exchange = resources.enter_context(closing(link))
                 advance = tuple(name for name in self.cast if name == "mover")
                 sense = tuple(name for name in self.cast if name not in (*advance, *self.watch))
                 roles = Roles(advance, sense, ("judge",), self.watch)

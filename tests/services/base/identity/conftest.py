@@ -25,6 +25,6 @@ def enter(cid: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator
             session.hear_directly()
             if says:
                 address_book.enter(tmp_path, name, session.address)
-            return session, Members(session, name, SenderTable.load(session.messages), World.load(session.messages))
+            return session, Members(session, name, SenderTable(session.messages), World(session.messages))
 
         yield one

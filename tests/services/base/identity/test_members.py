@@ -114,7 +114,7 @@ def test_what_the_application_prints_comes_from_the_runner_alone(
 def test_who_may_end_the_input_alone_may_say_what_was_not_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, "dodo.EndOfInput=camera,drive")
     messages = MessageSet.standard()
-    table = SenderTable.load(messages)
+    table = SenderTable(messages)
     told = table.by_message[messages.id("dodo.NotShown"), None]
     assert (told.services, told.reason) == (
         ("camera", "drive"), "the application sent dodo.NotShown, which only 'camera' and 'drive' may send",
@@ -126,7 +126,7 @@ MESSAGES = MessageSet.standard()
 
 def loaded(monkeypatch: pytest.MonkeyPatch, text: str) -> SenderTable:
     monkeypatch.setenv(VARIABLE, text)
-    return SenderTable.load(MESSAGES)
+    return SenderTable(MESSAGES)
 
 
 def of(name: str, stamp: int) -> Envelope:
