@@ -77,24 +77,3 @@ def test_fifty_drives_under_load_are_one(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout
     assert f"{STRAIGHT}: 50 of 50 runs gave " in done.stdout
     assert drive(compose)["checks"] != drive(compose, 0, "--seed", "1")["checks"]
-
-
-SPINS = """\
-import sys, time
-from dodo_dsl.opendlv.shared_memory import SharedMemory
-name = next(word[7:] for word in sys.argv if word.startswith("--name="))
-with SharedMemory.attach(name) as memory:
-    for _ in range(3):
-        memory.wait()
-    while True:
-        pass
-"""
-
-
-@pytest.mark.proof
-def test_one_who_computes_without_end_is_named(tmp_path: Path) -> None:
-    (tmp_path / "spins.py").write_text(SPINS)
-    test = drive(program(tmp_path, "python", "spins.py", **{"x-dodo": {"in": [], "out": OUT}}), 1)
-    assert test["outcome"] == "failed"
-    assert "of service 'app' computed for 2 s without waiting; " in test["reason"]
-    assert "in lockstep the test goes on only when all threads wait" in test["reason"]

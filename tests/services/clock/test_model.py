@@ -2,17 +2,16 @@
 
 import re
 import threading
-import time
 from fractions import Fraction
 from typing import Any
 
 import pytest
 
-from services.base.lockstep_clock import EPOCH, AnnouncedMemory
+from services.base.lockstep_clock import EPOCH
 from services.clock import exchange
 from services.clock.exchange import ApplicationFails, Patience, ServiceSilent, TimeOver
 from services.clock.model import Stepper
-from tests.services.clock.toys import BOX, DRIVE, STEP, Filter, Mover, Toys, Watcher
+from tests.services.clock.toys import BOX, DRIVE, STEP, Filter, Mover, Toys
 
 Way = list[tuple[int, float]]
 
@@ -55,23 +54,6 @@ def test_the_way_is_as_computed_by_hand_whatever_the_manners(toys: Toys, manner:
     assert stepper.application.frames == 21
     assert application.seen[:2] == pytest.approx([0.01, 0.11], abs=0.05)
     assert len(application.seen) in (20, 21), "every picture once"
-
-
-@pytest.mark.thorough
-def test_who_watches_sees_each_picture(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where a camera is kept from showing it at once, after it has said that it will."""
-    show = AnnouncedMemory.announce
-
-    def late(memory: AnnouncedMemory) -> None:
-        time.sleep(0.02)
-        show(memory)
-
-    monkeypatch.setattr(AnnouncedMemory, "announce", late)
-    watcher = Watcher(toys.memory_name())
-    toys.cast, toys.watch = {**DRIVE, "watcher": lambda *_: watcher}, ("watcher",)
-    toys.run(toys.application())
-    steps = [EPOCH + number * STEP for number in range(21)]
-    assert watcher.seen[:20] == [(now, now) for now in steps[:20]]
 
 
 @pytest.mark.thorough

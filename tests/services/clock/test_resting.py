@@ -272,7 +272,7 @@ def test_the_way_of_one_who_acts_by_a_timer_is_as_computed_by_hand(tmp_path: Pat
             while (heard := session.receive(0.0)) is not None:
                 sent.append(heard.sent - EPOCH)
             if until > went[-1]:
-                with SharedMemory.attach(toys.memory_name()) as memory, memory.lock():
+                with SharedMemory.attach(toys.memory_name) as memory, memory.lock():
                     (place,) = struct.unpack("<d", memory.buffer[:8])
                 for now in range(went[-1], until):
                     if (now - EPOCH) % every == 0:

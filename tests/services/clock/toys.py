@@ -94,29 +94,11 @@ class ToyEvaluator(Service):
         return ()
 
 
-class Watcher(Service):
-    """Looks at a memory in each step without being one of its readers: the step's time, and that of the picture."""
-
-    period = STEP
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self.seen: list[tuple[int, int]] = []
-
-    def update(self, now: int) -> Iterable[Any]:
-        memory = SharedMemory.attach(self._name)
-        with memory.lock():
-            self.seen.append((now, memory.sample_time()))
-        memory.close()
-        return ()
-
-
 @dataclass
 class ToyApplication:
     """Steers by what it sees. ``copies`` its sample time, says it ``times`` often, ``pause`` waits before it does.
 
-    ``boxes`` are said of each picture before that, each after another pause. ``delay`` is how many seconds pass from
-    being told of a picture to looking at it.
+    ``boxes`` are said of each picture before that, each after another pause.
     """
 
     cid: int
@@ -126,7 +108,6 @@ class ToyApplication:
     pause: Callable[[int], float] = lambda _: 0.0
     most: int = 1_000_000
     boxes: int = 0
-    delay: float = 0.0
     seen: list[float] = field(default_factory=list)
 
     def run(self, stopped: Callable[[], bool]) -> None:
@@ -136,7 +117,6 @@ class ToyApplication:
             try:
                 while not stopped() and len(self.seen) < self.most:
                     memory.wait()  # as libcluon's readers do: one that looks away now and then may miss a picture
-                    time.sleep(self.delay)
                     with memory.lock():
                         (place,), sampled = struct.unpack("<d", memory.buffer[:8]), memory.sample_time()
                     self.seen.append(place)
@@ -187,7 +167,7 @@ DRIVE: dict[str, Maker] = {"mover": lambda s, _: Mover(s), "eye": lambda _, memo
 
 @dataclass
 class Toys:
-    """Runs the test: a mover goes on, others sense but for those who ``watch``; the ``evaluator`` looks."""
+    """Runs the test: a mover goes on, others sense; the ``evaluator`` looks."""
 
     cid: int
     seconds: float = 2.0
@@ -197,18 +177,18 @@ class Toys:
     timeout: int = 60_000_000
     readers: int = 1
     cast: dict[str, Maker] = field(default_factory=lambda: DRIVE)
-    watch: tuple[str, ...] = ()
     agent: TimeAgent | None = None
     """Where the application's own time is the test's."""
 
     def __post_init__(self) -> None:
         self.evaluator = ToyEvaluator(self.seconds)
 
-    def memory_name(self, service: str = "eye") -> str:
-        return f"dodo-toy-{os.getpid()}-{self.cid}-{service}"
+    @property
+    def memory_name(self) -> str:
+        return f"dodo-toy-{os.getpid()}-{self.cid}"
 
-    def application(self, service: str = "eye", **about: Any) -> ToyApplication:
-        return ToyApplication(self.cid, self.memory_name(service), **about)
+    def application(self, **about: Any) -> ToyApplication:
+        return ToyApplication(self.cid, self.memory_name, **about)
 
     def run(self, *applications: Runs) -> tuple[list[tuple[int, float]], Stepper]:
         """Raises what the Stepper raises."""
@@ -228,8 +208,8 @@ class Toys:
                 link = Exchange(session, path, makers, answers.take, stop.is_set, senders)
                 exchange = resources.enter_context(closing(link))
                 advance = tuple(name for name in self.cast if name == "mover")
-                sense = tuple(name for name in self.cast if name not in (*advance, *self.watch))
-                roles = Roles(advance, sense, ("judge",), self.watch)
+                sense = tuple(name for name in self.cast if name not in advance)
+                roles = Roles(advance, sense, ("judge",))
                 application = self._under_test(answers, exchange)
                 stepper = Stepper(roles, STEP, self.timeout, application, exchange)
                 with self._services(stop, makers, path):
@@ -266,5 +246,5 @@ class Toys:
         session = resources.enter_context(Session(self.cid))
         client = ClockClient(session, name, path)
         clock = LockstepClock(session, name, self.readers, client)
-        service = maker(session, lambda: resources.enter_context(clock.memory(self.memory_name(name), 8)))
+        service = maker(session, lambda: resources.enter_context(clock.memory(self.memory_name, 8)))
         return Loop(name, service, session, clock, 0)
