@@ -234,10 +234,9 @@ def run(
 
             with contextlib.closing(runner.backends):
                 outcomes = asyncio.run(runner.run(jobs, draw))
-        not_run = runner.not_run()
         plans = {job.plan.slug: job.plan for job in jobs}
         about = {s: run_report.Reported(p, target.folder / s, report / s) for s, p in plans.items()}
-        run_report.write_summary(stdout, outcomes, not_run, said, about)
+        run_report.write_summary(stdout, outcomes, runner.not_run, said, about)
         ran = {job.plan.slug: job for job in jobs}
         repeats = repeated((ran[o.slug].folder, o, ran[o.slug].report) for o in outcomes)
         for slug, lines in repeats.items():
@@ -247,7 +246,7 @@ def run(
                 stdout.writelines(f"        {printable(line)}\n" for line in lines)
         stdout.flush()
         with undisturbed():
-            circumstances = Circumstances((record(),), tuple(not_run))
+            circumstances = Circumstances((record(),), tuple(runner.not_run))
             problems = [problem for each in drawn for problem in each.result()]
             sentence, is_whole = save_report(target, report, outcomes, others, circumstances, _past(jobs, outcomes))
     stdout.writelines(f"{printable(problem)}\n" for problem in problems)

@@ -18,7 +18,7 @@ from dodo_dsl.run.backends import CombinedBackends, Job
 from dodo_dsl.run.engine import Engine
 from dodo_dsl.run.outcomes import describe, error_outcome
 from dodo_dsl.run.rigs.pool import opened
-from dodo_dsl.run.schedule import CorePool, Schedule
+from dodo_dsl.run.schedule import Schedule
 
 BackendName = Literal["process", "docker", "mixed"]
 Finished = Callable[[Job, Outcome], None]
@@ -63,18 +63,12 @@ class Runner:
         self.policy = policy
         self.keep = keep
         self.interrupted = False
-        self.skipped: list[Job] = []
-        self._cores = CorePool(schedule.capacity)
+        self.not_run: list[NotRun] = []
+        """The tests that never began, in the order in which they would have."""
         self.kept: list[str] = []
         """Sentences on the tests that were left running."""
         self._stop = False
         self._finished: Finished | None = None
-
-    def not_run(self) -> list[NotRun]:
-        """The tests that never began, in the order in which they would have."""
-        reason = "the run was interrupted" if self.interrupted else "a test before did not pass"
-        plans = [job.plan for job in self.skipped]
-        return [NotRun(plan.name, plan.slug, plan.spec, plan.level, reason) for plan in plans]
 
     async def run(self, jobs: Sequence[Job], finished: Finished | None = None) -> list[Outcome]:
         """The outcomes in the order of the jobs; SIGINT, SIGTERM and SIGHUP end all tests with their teardown.
@@ -121,7 +115,8 @@ class Runner:
             self.progress.phase(job.plan.slug, f"waiting to be tried again alone, after error: {outcome.reason}")
             cores = self.schedule.capacity
         if outcome is None:
-            self.skipped.append(job)
+            reason, plan = "the run was interrupted" if self.interrupted else "a test before did not pass", job.plan
+            self.not_run.append(NotRun(plan.name, plan.slug, plan.spec, plan.level, reason))
             return None
         self._stop |= self.policy.fail_fast and outcome.outcome != "passed"
         self.progress.done(outcome)
@@ -132,7 +127,7 @@ class Runner:
     async def _turn(self, job: Job, cores: int) -> Outcome | None:
         """The outcome of an attempt with some cores, in its turn; None when no further one was to begin."""
         try:
-            async with self._cores.take(cores):
+            async with self.schedule.take(cores):
                 return None if self._stop or self.interrupted else await self._attempt(job)
         except asyncio.CancelledError:
             return None

@@ -19,6 +19,7 @@ class Schedule:
     def __init__(self, jobs: int | None, took: Took = lambda _: None) -> None:
         self.capacity, self._took = len(os.sched_getaffinity(0)) if jobs is None else jobs, took
         self._on_rig = _RIG if jobs is None else 1
+        self._free, self._turn = asyncio.Semaphore(self.capacity), asyncio.Lock()
 
     def need(self, job: Job) -> int:
         """How many of them a job takes."""
@@ -28,19 +29,12 @@ class Schedule:
         """The longest first, so that none of them runs alone at the end; an unknown one may take its whole timeout."""
         return sorted(jobs, key=lambda job: self._took(job) or job.plan.timeout_s, reverse=True)
 
-
-class CorePool:
-    """Cores that tests take and give back, first come, first served."""
-
-    def __init__(self, capacity: int) -> None:
-        self._capacity, self._free, self._turn = capacity, asyncio.Semaphore(capacity), asyncio.Lock()
-
     @contextlib.asynccontextmanager
     async def take(self, need: int) -> AsyncIterator[None]:
-        """Waits until ``need`` cores are free; a test that needs more than there are takes all."""
+        """Waits until ``need`` cores are free, first come, first served; who needs more than there are takes all."""
         with contextlib.ExitStack() as taken:
             async with self._turn:
-                for _ in range(min(need, self._capacity)):
+                for _ in range(min(need, self.capacity)):
                     await self._free.acquire()
                     taken.callback(self._free.release)
             yield

@@ -92,7 +92,7 @@ def test_fail_fast_begins_no_further_test(scene: Scene, fail_fast: bool, began: 
     outcomes = scene.run(*plans("abc"))
     assert (scene.backends.began, [outcome.slug for outcome in outcomes]) == (began, began)
     assert outcomes[0].outcome == "failed"
-    left = [(test.slug, test.reason) for test in scene.runner.not_run()]
+    left = [(test.slug, test.reason) for test in scene.runner.not_run]
     assert left == [(name, "a test before did not pass") for name in "abc" if name not in began]
 
 
@@ -229,7 +229,7 @@ def test_a_signal_ends_what_runs_and_what_waits(scene: Scene, number: int) -> No
         assert signal.getsignal(number) == mine
     finally:
         signal.signal(number, before)
-    assert scene.runner.not_run() == [NotRun("b", "b", "b/b.dodo.yml", "sil", "the run was interrupted")]
+    assert scene.runner.not_run == [NotRun("b", "b", "b/b.dodo.yml", "sil", "the run was interrupted")]
     assert (scene.runner.interrupted, scene.progress.notes[1:]) == (True, ["interrupted: taking down"])
     assert scene.backends.began == ["a"]
     assert ("b", "error") not in scene.progress.phases

@@ -22,7 +22,7 @@ from dodo_dsl import __version__, package_data
 from dodo_dsl.cli import run
 from dodo_dsl.cli import run as cli_run
 from dodo_dsl.cli.main import main
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan, PlannedService
 from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.report.viewer import page
@@ -288,7 +288,8 @@ def test_an_interrupt_before_any_test_leaves_the_report_before(dodo: Command, mo
     dodo.run()
 
     async def nothing(runner: Runner, jobs: Sequence[Job], _: object) -> list[Outcome]:
-        runner.interrupted, runner.skipped = True, list(jobs)
+        runner.interrupted = True
+        runner.not_run = [NotRun("test", "test", "test.dodo.yml", "sil", "the run was interrupted")]
         return []
 
     monkeypatch.setattr(Runner, "run", nothing)
