@@ -19,11 +19,6 @@ ALIVE_S = 1.0
 TEST_BEGIN = "dodo.TestBegin"
 
 
-def begin_frame(seed: int) -> bytes:
-    begin = MessageSet.standard().type(TEST_BEGIN)
-    return frame_of(begin(seed=seed))
-
-
 def frame_of(message: Message, sampled: int | None = None) -> bytes:
     """A message of DoDo's as a datagram of now, sampled at a time in us, by default now too."""
     known, now = MessageSet.standard(), time.time_ns() // 1000
@@ -32,11 +27,12 @@ def frame_of(message: Message, sampled: int | None = None) -> bytes:
     )
 
 
-def hearers(plan: Plan) -> list[str]:
-    """To whom the start is announced: the services that take it, and all where the application declares to take it."""
+def begin(plan: Plan) -> tuple[bytes, list[str]]:
+    """The start of a test, for the services that take it, and for all where the application declares to take it."""
+    frame = frame_of(MessageSet.standard().type(TEST_BEGIN)(seed=plan.seed))
     names = [CLOCK] if plan.lockstep else [service.name for service in plan.services]
     is_told = any(word.partition("/")[0] == TEST_BEGIN for word in plan.told)
-    return [*names, BUS] if is_told else names
+    return frame, [*names, BUS] if is_told else names
 
 
 @contextlib.asynccontextmanager

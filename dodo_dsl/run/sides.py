@@ -12,7 +12,7 @@ import msgspec
 
 from dodo_dsl.application.ros_topics import BRIDGE
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
-from dodo_dsl.run.announce import begin_frame, hearers
+from dodo_dsl.run.announce import begin
 from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.outcomes import unstartable
 from dodo_dsl.run.printed_lines import PrintedLines, Send
@@ -231,7 +231,7 @@ class Backend:
     async def begin(self) -> None:
         """Announces on the test's bus that everything is ready; may be repeated."""
         assert self._send is not None, "the application was started"
-        self._send(begin_frame(self._watched.plan.seed), hearers(self._watched.plan))
+        self._send(*begin(self._watched.plan))
 
     async def use(self) -> Snapshot | None:
         """What all have used; the load of the machine is measured if both sides know it."""

@@ -19,10 +19,6 @@ PLAYER = MessageSet.standard().id("cluon.data.PlayerStatus")
 BEGIN, STEP, END = "dodo.TestBegin", "dodo.RecordedStep", "dodo.RecordingEnd"
 
 
-class NoTestRecording(RecordingError):
-    """A recording by which no test can be judged."""
-
-
 @dataclass(frozen=True)
 class TestRecording:
     """A recording of a test: its clock, and the test time in s that it lasts.
@@ -39,12 +35,12 @@ class TestRecording:
 
 
 def inspect(path: Path) -> TestRecording:
-    """The facts about a recording; raises OSError, RecordingError, and NoTestRecording for one of no test."""
+    """The facts about a recording; raises OSError, and RecordingError also for one of no test."""
     messages = MessageSet.standard()
     with Recording(path) as recording:
         begins = recording.rows([messages.id(BEGIN)])
         if not len(begins):
-            raise NoTestRecording(
+            raise RecordingError(
                 f"{path}: has no {BEGIN} ({messages.id(BEGIN)}), with which every test begins; expected the recording "
                 "of a test, such as dodo-report/sil-closed-straight/test.rec"
             )
@@ -57,7 +53,7 @@ def inspect(path: Path) -> TestRecording:
             start = min(times) if fault else begin.sample_time
             return TestRecording(path, "lockstep", _seconds(max(times) - start), fault)
         if not begin.received:
-            raise NoTestRecording(
+            raise RecordingError(
                 f"{path}: has no {STEP} ({messages.id(STEP)}), which separates the steps of a test in lockstep; it "
                 "was made by an earlier version of DoDo, so run the test again"
             )

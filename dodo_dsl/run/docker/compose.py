@@ -136,7 +136,9 @@ class Compose:
         """Pulls and builds the services' images, once for all tests of a run; raises BackendError."""
         private = private_images(self.services, self._paths.folder, self._outside)
         foreign = {service["image"] for name, service in self.services.items() if name not in private}
-        for note in await pulls.provide(self.plan, self._own_images(), foreign, self.say):
+        own = {service.image for service in self.plan.services}
+        own |= {self.plan.sandbox_image} if self.plan.isolation == "network" or self.plan.application.copies else set()
+        for note in await pulls.provide(self.plan, own if self.is_whole else (), foreign, self.say):
             self.say(note)
         for name, image in private.items():
             self.services[name]["image"] = image
@@ -144,12 +146,6 @@ class Compose:
         if built:
             key = json.dumps(sorted(service["image"] for service in built.values()))
             await pulls.once(key, lambda: self._build(built))
-
-    def _own_images(self) -> set[str]:
-        if not self.is_whole:
-            return set()
-        sandbox = {self.plan.sandbox_image} if self.plan.isolation == "network" or self.plan.application.copies else ()
-        return {service.image for service in self.plan.services}.union(sandbox)
 
     async def _build(self, services: Mapping[str, Any]) -> None:
         """Builds images in a project that all tests have in common, from folders without what is hidden."""

@@ -6,7 +6,7 @@ import pytest
 
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.recording import RecordingError
-from dodo_dsl.run.test_recording import NoTestRecording, inspect
+from dodo_dsl.run.test_recording import inspect
 from tests.run.recorded.made import EPOCH, begin, message, step, write
 
 PEDAL = "opendlv.proxy.PedalPositionRequest"
@@ -35,10 +35,10 @@ def test_marks_that_the_application_sent_do_not_count(tmp_path: Path) -> None:
 
 def test_recordings_of_no_test_are_refused(tmp_path: Path) -> None:
     with pytest.raises(
-        NoTestRecording, match=r"a\.rec: has no dodo\.TestBegin \(2900\), .* expected the recording of a"
+        RecordingError, match=r"a\.rec: has no dodo\.TestBegin \(2900\), .* expected the recording of a"
     ):
         inspect(write(tmp_path / "a.rec", message(PEDAL, 3, WALL)))
-    with pytest.raises(NoTestRecording, match=r"has no dodo\.RecordedStep \(2905\), .* run the test again"):
+    with pytest.raises(RecordingError, match=r"has no dodo\.RecordedStep \(2905\), .* run the test again"):
         inspect(write(tmp_path / "old.rec", begin(), message(PEDAL, 3, WALL)))
     (tmp_path / "text.rec").write_text("not a recording at all")
     with pytest.raises(RecordingError, match="is not a recording"):
