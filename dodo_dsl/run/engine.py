@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.added_services import CLOCK
 from dodo_dsl.plan.model import LAYERS, READY_S, Plan
-from dodo_dsl.run import listeners, start_order
+from dodo_dsl.run import listeners
 from dodo_dsl.run.machine_load.meter import Meter
 from dodo_dsl.run.protocol import (
     BackendError,
@@ -165,9 +165,9 @@ class Engine:
         begin = self._now()
         patience = dict.fromkeys(waits, READY_PATIENCE_S)
         patience |= {s.name: READY_PATIENCE_S + s.setup_s for s in self.plan.services if s.name in waits}
-        services = self.plan.application.services
-        longest_s = start_order.LONGEST_S * (len(services) + 1) + READY_PATIENCE_S  # each may wait for the one before
-        patience |= {s.name: longest_s for s in services if s.after}
+        patience |= {
+            s.name: math.inf for s in self.plan.application.services if s.after
+        }  # as conditions end
         while left := waits - self.state.ready:
             late = min(left, key=lambda name: (patience[name], name))
             event = await self._next(begin + patience[late])

@@ -38,7 +38,6 @@ from dodo_dsl.run.protocol import (
     Time,
     VerdictEvent,
 )
-from dodo_dsl.run.start_order import LONGEST_S
 from dodo_dsl.spec.model import ResourceLimits
 from tests.run.scripted import BUSY, FAILED, PASSED, READY, Events, ScriptedBackend, drives, load, plan, run
 
@@ -240,21 +239,6 @@ def test_what_happens_during_set_up(case: str) -> None:
     assert (found.outcome, found.reason) == ("error", reason)
     assert (found.setup_s, found.execution_s, backend.calls[-1]) == (None, None, "close")
     assert "begin" not in backend.calls
-
-
-class Waiting(ScriptedBackend):
-    """Its application's services say when they are ready, which they never do."""
-
-    async def start(self, layer: str) -> dict[str, bool]:
-        return dict.fromkeys(await super().start(layer), True)
-
-
-def test_one_that_waits_for_others_has_the_time_that_these_may_take() -> None:
-    services = (ApplicationService("app", after={"db": "service_healthy"}), ApplicationService("db"))
-    tested = plan(application=Application(".", services))
-    reason = f"service 'app' was not ready within {3 * LONGEST_S + READY_PATIENCE_S:g} s"
-    found = outcome(Waiting(tested, {**READY, "application": [(1.0, Ready("db"))]}))
-    assert (found.outcome, found.reason) == ("error", reason)
 
 
 def test_a_service_with_a_longer_set_up_is_waited_for() -> None:
