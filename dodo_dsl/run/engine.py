@@ -165,9 +165,7 @@ class Engine:
         begin = self._now()
         patience = dict.fromkeys(waits, READY_PATIENCE_S)
         patience |= {s.name: READY_PATIENCE_S + s.setup_s for s in self.plan.services if s.name in waits}
-        patience |= {
-            s.name: math.inf for s in self.plan.application.services if s.after
-        }  # as conditions end
+        patience |= {s.name: math.inf for s in self.plan.application.services if s.after}  # as conditions end
         while left := waits - self.state.ready:
             late = min(left, key=lambda name: (patience[name], name))
             event = await self._next(begin + patience[late])

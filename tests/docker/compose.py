@@ -1,6 +1,7 @@
 """Tests of small scripts in containers: compose files written by hand, as the compiler would lay them out."""
 
 import asyncio
+import contextlib
 import json
 import os
 import secrets
@@ -99,7 +100,8 @@ class Crate:
         """The outcomes by slug without the mark, all at once."""
         backends = CombinedBackends(backend, subnets=SUBNETS)
         runner = Runner(self.progress, backends, Schedule(len(jobs)), Policy())
-        return {o.slug.removeprefix(f"{self.mark}-"): o for o in asyncio.run(runner.run(jobs))}
+        with contextlib.closing(backends):
+            return {o.slug.removeprefix(f"{self.mark}-"): o for o in asyncio.run(runner.run(jobs))}
 
     def start(self, job: Job, *flags: str, **variables: str) -> "subprocess.Popen[str]":
         """``dodo run`` of one test."""
