@@ -48,15 +48,11 @@ def read(service: str, is_evaluator: bool, message: bytes) -> Event | None:
             is_good = said.outcome == "passed"
             return VerdictEvent(service, is_good, said.reason, checks, said.evidence, said.silent)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError) as error:
-        problem = "its outcome is neither passed nor failed" if "$.outcome" in str(error) else str(error)
-        reason = f"the verdict of evaluator '{service}' is malformed: {problem}"
+        reason = f"the verdict of evaluator '{service}' is malformed: {error}"
         return Finding("error", reason, service) if is_verdict else None
-    match said:
-        case Noted(text=note):
-            return Noted(f"service '{service}': {note}")
-        case Late() if said.late > said.updates:
-            return None
-    return said
+    if isinstance(said, Late) and said.late > said.updates:
+        return None
+    return Noted(f"service '{service}': {said.text}") if isinstance(said, Noted) else said
 
 
 def _words(event: Event) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application.host_paths import HostPaths
+from dodo_dsl.application.interpolation import escaped
 from dodo_dsl.application.merge import is_path
 
 
@@ -75,8 +76,8 @@ def masks(mounted: Sequence[Bind], hidden: Sequence[Path], empty: Path) -> list[
             elif path.is_relative_to(source):
                 targets[Path(bind.target, path.relative_to(source))] = path.is_file()
     outer = {target: is_file for target, is_file in targets.items() if targets.keys().isdisjoint(target.parents)}
-    kinds = {True: {"type": "bind", "source": _escaped(empty)}, False: {"type": "tmpfs"}}
-    return [{**kinds[is_file], "target": _escaped(target), "read_only": True} for target, is_file in outer.items()]
+    kinds = {True: {"type": "bind", "source": escaped(str(empty))}, False: {"type": "tmpfs"}}
+    return [{**kinds[is_file], "target": escaped(str(target)), "read_only": True} for target, is_file in outer.items()]
 
 
 def absent(mounted: Sequence[Bind], paths: HostPaths, always: bool = False) -> list[dict[str, Any]]:
@@ -87,8 +88,4 @@ def absent(mounted: Sequence[Bind], paths: HostPaths, always: bool = False) -> l
     """
     gone = [b for b in mounted if not os.path.lexists(b.source) and not paths.is_writable(b.source)]
     made = [bind for bind in gone if always or not bind.is_required]
-    return [{"type": "tmpfs", "target": _escaped(bind.target), "read_only": True} for bind in made]
-
-
-def _escaped(path: str | Path) -> str:
-    return str(path).replace("$", "$$")
+    return [{"type": "tmpfs", "target": escaped(bind.target), "read_only": True} for bind in made]

@@ -62,6 +62,7 @@ class ContainerSide:
         self._kills: set[asyncio.Future[None]] = set()
         self._loop = asyncio.get_running_loop()
         self._events: Any = None
+        self._note = partial(self._call, watched.note)
         self.left_behind = False
 
     async def open(self, entered: int = 0) -> int:
@@ -289,11 +290,6 @@ class ContainerSide:
         writers = {name: self._containers[name] for name in names if name in self._containers}
         report = self._watched.report
         self.left_behind = not take_down(self._client, self._compose.project, writers, report, self._note)
-
-    def _note(self, text: str) -> None:
-        """Reports a sentence at once, and with the outcome; may be called from any thread."""
-        self._compose.say(text)
-        self._call(self._watched.note, text)
 
     def _kept(self) -> list[str]:
         compose = f"docker compose -p {self._compose.project}"
