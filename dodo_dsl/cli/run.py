@@ -32,7 +32,7 @@ from dodo_dsl.run.history import History, typical_s
 from dodo_dsl.run.process.fork_server import ForkServer
 from dodo_dsl.run.process.side import may_enter
 from dodo_dsl.run.protocol import BackendError
-from dodo_dsl.run.runner import BackendName, Policy, Runner, default_backend
+from dodo_dsl.run.runner import BackendName, Runner, default_backend
 from dodo_dsl.run.schedule import Schedule
 from dodo_dsl.run.work_folder import WorkFolder, reap_folders, work_folder
 from dodo_dsl.spec.deployment import Deployment
@@ -195,7 +195,8 @@ def runner_of(
     _require_possible(options, backend, plans)
     cids, nets, held = deployment.cids, [str(deployment.subnets)], (folder.lease.descriptor,)
     backends = CombinedBackends(backend, cids, nets, options.isolation, held, server)
-    return Runner(shown, backends, order, Policy(options.fail_fast, options.retry_errors), options.keep)
+    fail_fast, retries = options.fail_fast, options.retry_errors
+    return Runner(shown, backends, order, fail_fast=fail_fast, retries=retries, keep=options.keep)
 
 
 def _require_possible(options: argparse.Namespace, backend: str, plans: Sequence[Plan]) -> None:

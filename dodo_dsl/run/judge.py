@@ -12,10 +12,10 @@ from dodo_dsl.run.process.commands import Commands
 from dodo_dsl.run.process.confinement import Command
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Finding, Noted, VerdictEvent
+from dodo_dsl.run.service_output import TAIL_LINES, TAIL_WIDTH
 from dodo_dsl.run.test_recording import TestRecording
 
 NOT_OF_A_RECORDING = ("DODO_READERS", "DODO_RIG", "DODO_WORLD", "DODO_TOLD", "DODO_TRUTH")
-_TAIL_LINES, _TAIL_WIDTH = 8, 300
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ def judge(plan: Plan, folder: Path, recording: TestRecording, cid: int, work: Pa
     finding = decide(plan, findings, verdicts)
     last: list[str] = []
     if finding.result != "passed" and finding.service in ended:
-        last = ended[finding.service].stderr.decode("utf-8", "replace").splitlines()[-_TAIL_LINES:]
-    last_lines = tuple(line[:_TAIL_WIDTH] for line in last if line.strip())
+        last = ended[finding.service].stderr.decode("utf-8", "replace").splitlines()[-TAIL_LINES:]
+    last_lines = tuple(line[:TAIL_WIDTH] for line in last if line.strip())
     return Judgement(finding, tuple(v for each in verdicts.values() for v in each), tuple(notes), last_lines)
 
 

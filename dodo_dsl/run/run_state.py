@@ -280,7 +280,9 @@ class RunState:
         """What was measured of the machine, with the lateness of DoDo's services; None in lockstep."""
         if self.began is None or self.finished is None or self.plan.clock != "realtime":
             return None
-        pictured = pictured_by(self.plan)
+        memory = ("memory", "memories")  # of which they show pictures to the application
+        cameras = self.plan.layer("environment")
+        pictured = [s.name for s in cameras if any(flag.kind in memory for flag in s.flags)]
         late = {name: each for name, each in self.late.items() if name != RECORDER}  # of which no verdict depends
         shares = {name: each.late / each.updates for name, each in late.items()}
         load = self.load or MachineLoad(self.finished - self.began)
@@ -299,9 +301,3 @@ class RunState:
             for name, layer in sorted(self.layer_of.items(), key=lambda item: (LAYERS.index(item[1]), item[0]))
             if name != TIME
         ]
-
-
-def pictured_by(plan: Plan) -> list[str]:
-    """Services that show pictures to the application: those of the environment with shared memory."""
-    kinds = ("memory", "memories")
-    return [s.name for s in plan.layer("environment") if any(flag.kind in kinds for flag in s.flags)]

@@ -7,7 +7,7 @@ import itertools
 import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, Protocol, Self
 
 from dodo_dsl.application import secret_variables
@@ -43,25 +43,26 @@ def default_backend(plans: Sequence[Plan]) -> BackendName:
     return "process" if all(s.process for s in services) else "docker"
 
 
-@dataclass(frozen=True)
-class Policy:
-    """What to do when a test does not pass: begin no further ones; try it again so often when it ended in error."""
-
-    fail_fast: bool = False
-    retries: int = 0
-
-
 class Runner:
-    """Runs jobs, as many at once as ``schedule`` allows, in its order."""
+    """Runs jobs, as many at once as ``schedule`` allows, in its order.
+
+    With ``fail_fast`` it begins no further ones after one that did not pass; errors have so many ``retries``.
+    """
 
     def __init__(
-        self, progress: Progress, backends: CombinedBackends, schedule: Schedule, policy: Policy, keep: bool = False
+        self,
+        progress: Progress,
+        backends: CombinedBackends,
+        schedule: Schedule,
+        *,
+        fail_fast: bool = False,
+        retries: int = 0,
+        keep: bool = False,
     ) -> None:
         self.progress = progress
         self.backends = backends
         self.schedule = schedule
-        self.policy = policy
-        self.keep = keep
+        self.fail_fast, self.retries, self.keep = fail_fast, retries, keep
         self.interrupted = False
         self.not_run: list[NotRun] = []
         """The tests that never began, in the order in which they would have."""
@@ -95,7 +96,7 @@ class Runner:
     async def _one(self, job: Job) -> Outcome | None:
         """A test's outcome, or None when no further test was to begin.
 
-        An error is tried again, alone and behind all that wait: as often as the policy says, and once where the machine
+        An error is tried again, alone and behind all that wait: as often as is allowed, and once where the machine
         was too busy. What was before stays in the report.
         """
         notes: tuple[str, ...] = ()
@@ -105,7 +106,8 @@ class Runner:
             if latest is None:
                 break
             outcome = replace(latest, notes=(*notes, *latest.notes))
-            most = max(self.policy.retries, is_undecided(outcome))
+            is_undecided = outcome.machine is not None and outcome.machine.undecided
+            most = max(self.retries, is_undecided)
             if outcome.outcome != "error" or number > most or self.interrupted or self.keep:
                 break
             if problem := _set_aside(job, number):
@@ -118,7 +120,7 @@ class Runner:
             reason, plan = "the run was interrupted" if self.interrupted else "a test before did not pass", job.plan
             self.not_run.append(NotRun(plan.name, plan.slug, plan.spec, plan.level, reason))
             return None
-        self._stop |= self.policy.fail_fast and outcome.outcome != "passed"
+        self._stop |= self.fail_fast and outcome.outcome != "passed"
         self.progress.done(outcome)
         if self._finished:
             self._finished(job, outcome)
@@ -186,8 +188,3 @@ def _signals_call(react: Callable[[], None]) -> Iterator[None]:
         for number, handler in before.items():
             loop.remove_signal_handler(number)
             signal.signal(number, handler)
-
-
-def is_undecided(outcome: Outcome) -> bool:
-    """Whether the machine was too busy to judge."""
-    return outcome.machine is not None and outcome.machine.undecided

@@ -20,8 +20,8 @@ from dodo_dsl.log_times import LogTimes
 _MAX_LINE = 1 << 16
 _MAX_LOG = 64 << 20
 _MAX_LOG_LINES = 500_000
-_TAIL_LINES = 8
-_TAIL_WIDTH = 300
+TAIL_LINES = 8
+TAIL_WIDTH = 300
 _FULL = 1 << 12
 """Bytes that a terminal holds; a program that has printed as many may sleep only because it has to wait."""
 _ENOUGH = 1 << 14
@@ -64,7 +64,7 @@ class ServiceOutput:
         self._written = self._lines = 0
         self._rest = self._handed = b""
         self._skipping = False
-        self._tail: deque[bytes] = deque(maxlen=_TAIL_LINES)
+        self._tail: deque[bytes] = deque(maxlen=TAIL_LINES)
         self._is_cooked = is_cooked
         self._reader, self.writer = _terminal() if terminal else os.pipe2(os.O_CLOEXEC)
         os.set_blocking(self._reader, False)
@@ -76,7 +76,7 @@ class ServiceOutput:
         os.close(self.writer)
 
     def tail(self) -> list[str]:
-        return [line.decode("utf-8", "replace")[:_TAIL_WIDTH] for line in self._tail]
+        return [line.decode("utf-8", "replace")[:TAIL_WIDTH] for line in self._tail]
 
     def hand_over(self) -> tuple[int, int]:
         """Stops reading; returns the descriptors of pipe and log for the process that goes on."""
@@ -127,7 +127,7 @@ class ServiceOutput:
         self._write(b"".join(line + b"\n" for line in lines if self._take(line)))
         if len(self._rest) > _MAX_LINE:
             if not self._skipping:
-                self._tail.append(self._rest[:_TAIL_WIDTH])
+                self._tail.append(self._rest[:TAIL_WIDTH])
             self._write(self._rest)
             self._skipping, self._rest = True, b""
         return True

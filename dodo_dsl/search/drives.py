@@ -15,7 +15,7 @@ from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.emit.output_folder import write
 from dodo_dsl.outcome import Outcome, failed_checks, worst_margin
 from dodo_dsl.run.backends import CombinedBackends, Job
-from dodo_dsl.run.runner import Policy, Progress, Runner
+from dodo_dsl.run.runner import Progress, Runner
 from dodo_dsl.run.schedule import Schedule
 from dodo_dsl.search.space import texts
 from dodo_dsl.search.store import Drive, Store, point_text
@@ -116,7 +116,7 @@ class Drives:
         folder = self.work / f"round-{min(points)}"
         jobs = self._jobs(points, folder)
         by_slug = {job.plan.slug: number for number, job in jobs.items()}
-        runner = Runner(self.progress, self.backends, self.order, Policy(retries=_RETRIES))
+        runner = Runner(self.progress, self.backends, self.order, retries=_RETRIES)
 
         def take(job: Job, outcome: Outcome) -> None:
             if not runner.interrupted:

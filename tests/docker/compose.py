@@ -16,7 +16,7 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import LAYERS, Flag, Plan
 from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.run.backends import CombinedBackends, Job
-from dodo_dsl.run.runner import Policy, Runner
+from dodo_dsl.run.runner import Runner
 from dodo_dsl.run.schedule import Schedule
 from tests.run.desk import ROOT
 from tests.run.helpers import READY, STARTED, WAIT, Bench, Recorded
@@ -99,7 +99,7 @@ class Crate:
     def run(self, *jobs: Job, backend: str = "docker") -> dict[str, Outcome]:
         """The outcomes by slug without the mark, all at once."""
         backends = CombinedBackends(backend, subnets=SUBNETS)
-        runner = Runner(self.progress, backends, Schedule(len(jobs)), Policy())
+        runner = Runner(self.progress, backends, Schedule(len(jobs)))
         with contextlib.closing(backends):
             return {o.slug.removeprefix(f"{self.mark}-"): o for o in asyncio.run(runner.run(jobs))}
 

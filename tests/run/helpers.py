@@ -12,7 +12,7 @@ from pathlib import Path
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan, PlannedService
 from dodo_dsl.run.backends import CombinedBackends, Job
-from dodo_dsl.run.runner import Policy, Runner
+from dodo_dsl.run.runner import Runner
 from dodo_dsl.run.schedule import Schedule
 from tests.run import scripted
 
@@ -112,15 +112,13 @@ class Bench:
         (self.folder / "compiled").mkdir(exist_ok=True)
         return [Job(plan, self.folder / "compiled", self.folder / "report" / plan.slug) for plan in plans]
 
-    def run(
-        self, *plans: Plan, parallel: int = 4, policy: Policy | None = None, backends: CombinedBackends | None = None
-    ) -> list[Outcome]:
+    def run(self, *plans: Plan, parallel: int = 4, backends: CombinedBackends | None = None) -> list[Outcome]:
         """The outcomes; on the host with CIDs that no other test uses."""
         with reserved_cids(len(plans)) as cids:
             backends = backends or CombinedBackends("process", cids, isolation=self.isolation)
             if self.isolation == "host":
                 plans = tuple(replace(plan, cid=cids[0]) for plan in plans)
-            self.runner = Runner(self.progress, backends, Schedule(parallel), policy or Policy())
+            self.runner = Runner(self.progress, backends, Schedule(parallel))
             with contextlib.closing(backends):
                 return asyncio.run(self.runner.run(self.jobs(*plans)))
 

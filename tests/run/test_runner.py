@@ -5,6 +5,7 @@ import signal
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,7 +14,7 @@ from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.protocol import BackendError, Exited, VerdictEvent
-from dodo_dsl.run.runner import Policy, Runner
+from dodo_dsl.run.runner import Runner
 from dodo_dsl.run.schedule import Schedule
 from tests.run.helpers import Recorded
 from tests.run.scripted import (
@@ -41,7 +42,7 @@ class Scene:
 
     folder: Path
     backends: ScriptedBackends = field(default_factory=ScriptedBackends)
-    policy: Policy = field(default_factory=Policy)
+    policy: dict[str, Any] = field(default_factory=dict)
     capacity: int = 4
     progress: Recorded = field(default_factory=Recorded)
     signals: tuple[tuple[float, int], ...] = ()
@@ -50,7 +51,7 @@ class Scene:
 
     def run(self, *plans: Plan, keep: bool = False) -> list[Outcome]:
         order = Schedule(self.capacity)
-        self.runner = Runner(self.progress, self.backends, order, self.policy, keep)
+        self.runner = Runner(self.progress, self.backends, order, keep=keep, **self.policy)
         return run(self._run(jobs(self.folder, *plans)))
 
     async def _run(self, given: list[Job]) -> list[Outcome]:
@@ -87,7 +88,7 @@ def test_the_longest_begins_first_and_outcomes_keep_the_order_of_the_jobs(scene:
 
 @pytest.mark.parametrize(("fail_fast", "began"), [(True, ["a"]), (False, ["a", "b", "c"])])
 def test_fail_fast_begins_no_further_test(scene: Scene, fail_fast: bool, began: list[str]) -> None:
-    scene.capacity, scene.policy = 1, Policy(fail_fast)
+    scene.capacity, scene.policy = 1, {"fail_fast": fail_fast}
     scene.backends.make = by_slug(a=drives(1.0, FAILED))
     outcomes = scene.run(*plans("abc"))
     assert (scene.backends.began, [outcome.slug for outcome in outcomes]) == (began, began)
@@ -111,7 +112,7 @@ def logged(scene: Scene) -> Scene:
 
 
 def test_an_error_is_retried_and_both_attempts_are_kept(logged: Scene) -> None:
-    logged.policy = Policy(retries=2)
+    logged.policy = {"retries": 2}
     (outcome,) = logged.run(plan("a"))
     assert logged.backends.began == ["a", "a"], "a failure is none"
     assert (outcome.outcome, outcome.reason) == ("failed", "hit wall left")
@@ -180,7 +181,7 @@ def always_too_busy(tested: Plan, _: int) -> ScriptedBackend:
 
 @pytest.mark.parametrize("retries", [0, 2])
 def test_a_machine_that_stays_too_busy_is_an_error(scene: Scene, retries: int) -> None:
-    scene.backends.make, scene.policy, scene.capacity = always_too_busy, Policy(retries=retries), 1
+    scene.backends.make, scene.policy, scene.capacity = always_too_busy, {"retries": retries}, 1
     a, b = scene.run(*plans("ab"))
     assert endings([a, b]) == [("a", "error", TOO_BUSY), ("b", "error", TOO_BUSY)]
     assert scene.backends.began == list("ab" * (1 + max(1, retries)))
@@ -221,7 +222,7 @@ def test_a_verdict_outlives_what_breaks_after_it(scene: Scene, problem: Exceptio
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_what_runs_and_what_waits(scene: Scene, number: int) -> None:
-    scene.capacity, scene.signals, scene.policy = 1, ((4.0, number), (4.5, number)), Policy(retries=1)
+    scene.capacity, scene.signals, scene.policy = 1, ((4.0, number), (4.5, number)), {"retries": 1}
     before = signal.signal(number, lambda *_: None)
     mine = signal.getsignal(number)
     try:

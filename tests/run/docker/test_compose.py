@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from docker.errors import ImageNotFound
 
 from dodo_dsl.plan.model import ApplicationService, Plan
 from dodo_dsl.run.docker.compose import Compose
@@ -131,28 +130,6 @@ def test_what_the_engine_does_not_see_is_named(folder: Path, monkeypatch: pytest
     monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
     with pytest.raises(BackendError, match="does not see '/own/far' of this machine: work in a folder that it has"):
         asyncio.run(read(planned({"a": {"image": "a"}}), folder).create(["10.0.0.0/28"]))
-
-
-class EmptyEngine:
-    """A client of an engine that has no image."""
-
-    def __init__(self) -> None:
-        self.api = self
-
-    def inspect_image(self, _image: str) -> None:
-        raise ImageNotFound("there is none")
-
-
-def test_an_image_that_cannot_be_pulled(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    test = read(planned({"a": {"image": "r.example.org/a"}}), folder)
-    test.plan = replace(test.plan, services=(), isolation="host")
-    program = folder / "docker"
-    program.write_text("#!/bin/sh\necho 'Error response from daemon: denied' >&2\nexit 1\n")
-    program.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
-    told = "image r.example.org/a cannot be pulled: denied"
-    with pytest.raises(BackendError, match=f"^{told}$"):
-        asyncio.run(test.provide_images(Pulls(EmptyEngine())))
 
 
 def test_a_run_builds_from_a_copy_and_replaces_no_image(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from dodo_dsl.run.backends import Job
 from dodo_dsl.run.protocol import BackendError, Ready
 from dodo_dsl.run.rigs.leases import leased, quarantine
 from dodo_dsl.run.rigs.pool import opened
-from dodo_dsl.run.runner import Policy, Runner
+from dodo_dsl.run.runner import Runner
 from dodo_dsl.run.schedule import Schedule
 from dodo_dsl.run.sides import Backend
 from tests.run.scripted import ScriptedBackend, drives, one_by_one, plan, run
@@ -117,7 +117,7 @@ def test_the_outcome_names_the_rig() -> None:
     held = leases.try_lease("cid-121", {"test": "theirs"})
     assert held is not None
     quiet = SimpleNamespace(phase=lambda *_: None)
-    runner = Runner(cast(Any, quiet), cast(Any, Backends()), Schedule(1), Policy())
+    runner = Runner(cast(Any, quiet), cast(Any, Backends()), Schedule(1))
     outcome = run(runner._attempt(pool()))
     held.release()
     assert (outcome.outcome, outcome.slug, outcome.notes) == ("passed", "any", ("ran on rig 'kiwi-2'",))
