@@ -167,31 +167,24 @@ class Side(Protocol):
 
         0 stands for own namespaces, or the host's. Raises BackendError.
         """
-        ...
 
     async def connect(self) -> Send:
         """What sends to DoDo's services, which this side has, and on the bus; raises BackendError."""
-        ...
 
     async def start(self, layer: str) -> dict[str, bool]:
         """Starts the services of a layer; returns their names, and whether each will report that it is ready."""
-        ...
 
     async def listeners(self) -> Collection[str] | None:
         """The services of the application that listen on an OpenDLV bus already; None if that cannot be seen."""
-        ...
 
     async def use(self) -> Snapshot | None:
         """What the services used so far; None if that cannot be measured."""
-        ...
 
     async def application(self) -> Collection[int] | None:
         """Processes of this machine of which the application's are, or descend; None if they are not known."""
-        ...
 
     async def close(self, keep: bool) -> list[str]:
         """Ends everything and cleans up; with ``keep``, leaves it and returns sentences on how to look inside."""
-        ...
 
 
 class Backend:
