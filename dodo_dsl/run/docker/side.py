@@ -187,7 +187,7 @@ class ContainerSide:
             return
         if why := await self._watched.conditions.why_not(FILES, HEALTHY):
             said = await asyncio.to_thread(_last_line, self._containers[FILES]) or f"the program that does it {why}"
-            hint = "; mount large folders read-only (:ro)" if why == LATE else ""
+            hint = "; mount large folders read-only (:ro)" if why in (UNHEALTHY, LATE) else ""
             raise BackendError(f"the application's files cannot be copied: {said}{hint}")
         await asyncio.to_thread(self._kill, FILES)
 
