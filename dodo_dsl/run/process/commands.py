@@ -1,7 +1,7 @@
 """Commands that start a test's services as local processes: words, variables and folder, for the test's slot."""
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -64,15 +64,12 @@ class Commands:
         return tuple(masked(self.plan, service)) if self.is_on_host and self.is_apart else ()
 
     def _flag(self, flag: Flag) -> str:
-        values: dict[str, Callable[[], str]] = {
-            "path": lambda: str(self.folder / FILES / flag.value),
-            "report": lambda: str(self.report / flag.value),
-            "memory": lambda: memory_name(flag.value, self.slot.memory_prefix),
-            "memories": lambda: ",".join(memory_name(m, self.slot.memory_prefix) for m in flag.value.split(",")),
-        }
-        value = values.get(flag.kind, lambda: flag.value)()
-        own = {"cid": str(self.slot.cid), TIME_FOLDER: self.time_folder}
-        return f"--{flag.name}={own.get(flag.name, value)}"
+        value = {"cid": str(self.slot.cid), TIME_FOLDER: self.time_folder}.get(flag.name, flag.value)
+        if flag.kind in ("path", "report"):
+            value = str((self.report if flag.kind == "report" else self.folder / FILES) / value)
+        elif flag.kind in ("memory", "memories"):
+            value = ",".join(memory_name(name, self.slot.memory_prefix) for name in value.split(","))
+        return f"--{flag.name}={value}"
 
     @property
     def time_folder(self) -> str:
@@ -164,11 +161,6 @@ def needed_paths(plan: Plan, folder: Path, report: Path) -> list[Path]:
     words += [*plan.variables.values()]
     reads = [paths.folder / Path(path).expanduser() for path in plan.application.limits.reads]
     return [folder, report, *import_paths(plan, folder), paths.folder, *paths.roots, *reads, *named_paths(words)]
-
-
-def own_modules(plans: Iterable[Plan]) -> set[str]:
-    """The modules of DoDo's own services that tests have."""
-    return {own_module(service.process) for plan in plans for service in plan.services} - {""}
 
 
 def own_module(process: Sequence[str]) -> str:

@@ -16,11 +16,27 @@ import subprocess
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import IO
 
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.slot import Entered, package_path
 
 _MAX_MESSAGE, _MAX_DESCRIPTORS = 1 << 16, 64
+
+
+def python(
+    module: str, channel: socket.socket, held: Sequence[int] = (), log: IO[bytes] | int = subprocess.DEVNULL, **own: str
+) -> "subprocess.Popen[bytes]":
+    """A module of DoDo's as a process that gets a channel, and descriptors to hold."""
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", module, str(channel.fileno())],
+        pass_fds=(channel.fileno(), *held),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=log,
+        start_new_session=True,
+        env={**own_environment(), "PYTHONPATH": package_path(), **own},
+    )
 
 
 class ForkServer:
@@ -32,15 +48,7 @@ class ForkServer:
     def __init__(self) -> None:
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "dodo_dsl.run.process.fork_server", str(theirs.fileno())],
-                pass_fds=(theirs.fileno(),),
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                start_new_session=True,
-                env={**own_environment(), "PYTHONPATH": package_path()},
-            )
+            self._process = python("dodo_dsl.run.process.fork_server", theirs)
 
     def load(self, modules: Iterable[str]) -> None:
         """Lets the sandboxes to come have loaded these services of DoDo's."""

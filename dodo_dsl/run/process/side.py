@@ -9,7 +9,6 @@ import signal
 import socket
 import struct
 import subprocess
-import sys
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -26,12 +25,11 @@ from dodo_dsl.run import application_time
 from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import Send
 from dodo_dsl.run.process import host_isolation, leftovers
-from dodo_dsl.run.process.commands import Commands, needed_paths, own_modules
+from dodo_dsl.run.process.commands import Commands, needed_paths, own_module
 from dodo_dsl.run.process.confinement import Command
-from dodo_dsl.run.process.environment import own_environment
-from dodo_dsl.run.process.fork_server import ForkServer
+from dodo_dsl.run.process.fork_server import ForkServer, python
 from dodo_dsl.run.process.sandbox import MAX_MESSAGE
-from dodo_dsl.run.process.slot import SLOT_VARIABLE, Entered, Slot, in_memory, package_path
+from dodo_dsl.run.process.slot import SLOT_VARIABLE, Entered, Slot, in_memory
 from dodo_dsl.run.protocol import BackendError, Ready, Say
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.sides import APPLICATION, Side, WatchedServices
@@ -139,22 +137,16 @@ class ProcessSide:
         if self._gives_time:
             needed += await self._open_time()
         self._commands = replace(self._commands, by_answers=self._watched.by_answers)
-        namespaces, modules = Entered.with_own(entered, *needed), own_modules([self._plan])
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", SEND_S, 0))  # it may be busy
         with theirs, atomic.appended(self._report / LOG) as log:
             if self._fork_server is not None:
-                self._fork_server.fork(namespaces, modules, [theirs.fileno(), log.fileno(), *self._slot.descriptors])
+                modules = {own_module(service.process) for service in self._plan.services} - {""}
+                descriptors = [theirs.fileno(), log.fileno(), *self._slot.descriptors]
+                self._fork_server.fork(Entered.with_own(entered, *needed), modules, descriptors)
             else:
-                self._child = subprocess.Popen(
-                    [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox", str(theirs.fileno())],
-                    pass_fds=(theirs.fileno(), *self._slot.descriptors),
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,
-                    stderr=log,
-                    start_new_session=True,
-                    env={**own_environment(), "PYTHONPATH": package_path(), SLOT_VARIABLE: self._slot.name},
-                )
+                name, held = {SLOT_VARIABLE: self._slot.name}, self._slot.descriptors
+                self._child = python("dodo_dsl.run.process.sandbox", theirs, held, log, **name)
         loop = asyncio.get_running_loop()
         self._socket.setblocking(False)
         said = await loop.sock_recv(self._socket, MAX_MESSAGE)
