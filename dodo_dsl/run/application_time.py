@@ -35,9 +35,8 @@ class ApplicationTime:
 
     def words(self, plan: Plan, folder: str, *, on_host: bool) -> tuple[str, ...]:
         """The agent's command, for a sandbox whose applications have their own process namespaces."""
-        others = ("--by-environment",) if on_host else ()
         flags = agent_flags(plan.application.services, plan.seed, folder)
-        return (str(self.agent), *flags, "--nested", *others)
+        return (str(self.agent), *flags, "--nested", *(("--by-environment",) if on_host else ()))
 
     def variables(self, given: Mapping[str, str], plan: Plan, service: str, folder: str) -> dict[str, str]:
         number = [each.name for each in plan.application.services].index(service)

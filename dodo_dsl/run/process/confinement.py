@@ -61,11 +61,11 @@ def readable(folder: Path, limits: SandboxLimits, *more: Path) -> tuple[str, ...
 
 
 def _inside(hidden: Iterable[str], shown: Iterable[str]) -> Iterator[str]:
-    """The paths that are there below those that are shown, by each of their names."""
+    """The paths below those that are shown, by each of their names."""
     real = {Path(path): Path(os.path.realpath(path)) for path in shown}
     for path in map(Path, hidden):
         for name, place in real.items():
-            if path != place and path.is_relative_to(place) and path.exists():
+            if path != place and path.is_relative_to(place):
                 yield str(name / path.relative_to(place))
 
 
@@ -127,7 +127,7 @@ def _seen(confined: Confinement, places: Places, program: str) -> list[str]:
     own = {path: ["--bind", str(source), path] for path, source in {**places.shared, HOME: places.home}.items()}
     own[confined.folder] = ["--bind" if places.writable else "--ro-bind", str(places.folder), confined.folder]
     inside = _inside(confined.hidden, (*SYSTEM, *confined.reads, confined.folder))
-    hidden = {*inside, *places.mounted} - {*reads, *own}
+    hidden = {*filter(os.path.exists, inside), *places.mounted} - {*reads, *own}
     words = ["--proc", "/proc", "--dev", "/dev", *(word for path in _EMPTY for word in ("--dir", path))]
     shows: dict[str, bool | None] = {"/": False}
     """Whether what is mounted at a path shows what lies there; None where that is another folder."""

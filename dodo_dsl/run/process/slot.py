@@ -44,15 +44,9 @@ class Entered:
         """With what in ``/tmp`` and ``/dev/shm`` holds ``needed`` paths, Python, DoDo, or those of ``_VARIABLES``."""
         own = (Path(sys.prefix), Path(sys.base_prefix), *(Path(place) for place in sys.path if place))
         given = named_paths(os.environ.get(name, "") for name in _VARIABLES)
-        names = {
-            Path(name)
-            for path in (*needed, *own, *given)
-            for name in (os.path.abspath(path), os.path.realpath(path))  # noqa: PTH100
-        }
-        lines = ([name, *name.parents] for name in names)
-        return cls(
-            process, tuple(sorted({path for line in lines for path in line if path.parent in namespaces.SHARED}))
-        )
+        names = {Path(place(path)) for path in (*needed, *own, *given) for place in (os.path.abspath, os.path.realpath)}
+        above = {path for name in names for path in (name, *name.parents)}
+        return cls(process, tuple(sorted(path for path in above if path.parent in namespaces.SHARED)))
 
 
 def in_memory(data: bytes) -> BinaryIO:
