@@ -7,6 +7,7 @@ import hashlib
 import os
 import platform
 import shutil
+import stat
 import struct
 import subprocess
 from collections.abc import Callable, Mapping
@@ -118,7 +119,10 @@ Look = Callable[[Path], tuple[int, bytes] | None]
 
 def on_this_machine(path: Path) -> tuple[int, bytes] | None:
     """As Look, for a program that is started as a process."""
-    return (path.stat().st_mode, _head(path, HEAD_SIZE)) if path.is_file() and os.access(path, os.X_OK) else None
+    with contextlib.suppress(OSError, ValueError):
+        if stat.S_ISREG(mode := path.stat().st_mode) and os.access(path, os.X_OK):
+            return mode, _head(path, HEAD_SIZE)
+    return None
 
 
 def refusal(service: str, name: str, environment: Mapping[str, str], folder: Path, look: Look = on_this_machine) -> str:

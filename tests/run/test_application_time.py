@@ -103,4 +103,5 @@ def test_so_are_those_that_change_their_user_and_the_interpreters_of_scripts(tmp
     alone.chmod(0o4755)
     assert "which changes its user" in refusal("driver", str(alone), {}, Path("/"))
     assert refusal("driver", "missing", {"PATH": str(tmp_path)}, Path("/")) == ""
-    assert application_time.refusal("driver", str(tmp_path / "gone"), {}, Path("/")) == ""
+    for name in (str(tmp_path / "gone"), "a\0b", "/a\0b"):
+        assert application_time.refusal("driver", name, {}, Path("/")) == ""
