@@ -52,13 +52,11 @@ class ForkServer:
 
     def load(self, modules: Iterable[str]) -> None:
         """Lets the sandboxes to come have loaded these services of DoDo's."""
-        self._send([sorted(modules), 0, []])
+        self.fork(Entered(0), modules, ())
 
     def fork(self, entered: Entered, modules: Iterable[str], descriptors: Sequence[int]) -> None:
         """Starts a sandbox that has loaded modules; ``descriptors`` are its end of a channel, its log, and leases."""
-        self._send([sorted(modules), entered.process, [*map(str, entered.shown)]], descriptors)
-
-    def _send(self, message: list[object], descriptors: Sequence[int] = ()) -> None:
+        message = [sorted(modules), entered.process, [*map(str, entered.shown)]]
         with contextlib.suppress(OSError):  # it has ended, which a sandbox's channel says
             socket.send_fds(self._socket, [json.dumps(message).encode()], descriptors)
 

@@ -86,11 +86,12 @@ def remove_unused() -> None:
                     folder.rmdir()
 
 
-def parents(counter: str = _PIDS, proc: Path = Path("/proc/self")) -> Iterator[Path]:
+def parents(counter: str = _PIDS) -> Iterator[Path]:
     """The groups in which others that count may be made: this process's own, or in version 2 the one above it."""
+    own_proc = Path("/proc/self")
     try:
-        groups = [line.split(":", 2) for line in (proc / "cgroup").read_text().splitlines()]
-        mounts = [line.split() for line in (proc / "mountinfo").read_text(errors="surrogateescape").splitlines()]
+        groups = [line.split(":", 2) for line in (own_proc / "cgroup").read_text().splitlines()]
+        mounts = [line.split() for line in (own_proc / "mountinfo").read_text(errors="surrogateescape").splitlines()]
     except OSError:
         return
     for _, controllers, path in groups:
