@@ -1,6 +1,7 @@
 """The example application, and copies of it that are wrong in one way."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -22,10 +23,13 @@ TOLD = {
 """``x-dodo`` of an application that declares to take its true pose."""
 
 
-def dodo(*words: str, code: int | tuple[int, ...], before: Sequence[str] = ()) -> str:
+def dodo(*words: str, code: int | tuple[int, ...], before: Sequence[str] = (), folder: Path = ROOT) -> str:
     """The output of a command, after the words ``before`` it, that must end with an exit code, or one of some."""
     command = [*before, sys.executable, "-m", "dodo_dsl", *words]
-    process = subprocess.Popen(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    process = subprocess.Popen(
+        command, cwd=folder, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
     hurry(process.pid)
     try:
         output, _ = process.communicate(timeout=600)

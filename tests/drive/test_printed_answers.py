@@ -1,7 +1,6 @@
 """Programs that print their answers, and the same program on the bus: equal answers, in lockstep and in real time."""
 
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -12,7 +11,7 @@ import yaml
 
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import Recording
-from tests.run.desk import ROOT
+from tests.drive.applications import ROOT, dodo
 
 STEERING = "opendlv.proxy.GroundSteeringRequest"
 EXAMPLE = ROOT / "examples" / "printing"
@@ -52,17 +51,7 @@ class Deployment:
 
     def dodo(self, *words: str) -> str:
         """The command's output, whatever becomes of the test."""
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "DODO_LEASES": str(self.folder / "leases")}
-        done = subprocess.run(
-            [sys.executable, "-m", "dodo_dsl", *words],
-            cwd=self.folder,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode in (0, 1, 3), done.stdout + done.stderr
-        return done.stdout
+        return dodo(*words, code=(0, 1, 3), folder=self.folder)
 
     def write(self, *process: str, flags: str = "", **declared: object) -> None:
         """The application, with its program and keys of x-dodo, by default the lines of the example."""

@@ -89,13 +89,6 @@ CASES = (
         is_user=True,
         environment={"HOME": "/proc", "XDG_STATE_HOME": "/proc/a", "XDG_CACHE_HOME": "/proc/b", "TMPDIR": "/dev/shm"},
     ),
-    Case(
-        "subfolder of a worktree, locale POSIX, HOME relative, TMPDIR among the tests",
-        "größe",
-        made="worktree",
-        at="{checkout}/tests",
-        environment={"LC_ALL": "POSIX", "PYTHONUTF8": "1", "HOME": "relative", "TMPDIR": "{checkout}/tests"},
-    ),
     Case("not UTF-8 in ASCII", NOT_UTF8, environment=IN_ASCII, code=2, says="/caf\\xe9' is not UTF-8"),
 )
 
@@ -135,11 +128,6 @@ def checkout_of(case: Case, scratch: Path, **service: object) -> Iterator[Path]:
         (scratch / "tmp").mkdir()
     finally:
         os.umask(before)
-    if case.made == "worktree":
-        git = ["git", "-c", "user.name=a", "-c", "user.email=a@example.org", "-C", str(checkout)]
-        for words in (["init", "-q"], ["add", "."], ["commit", "-qm", "a"], ["worktree", "add", "-q", "../tree"]):
-            subprocess.run([*git, *words], check=True)
-        checkout = scratch / "tree"
     if case.made == "symlink":
         (scratch / "link").symlink_to(checkout)
         checkout = scratch / "link"

@@ -74,16 +74,14 @@ class Source(Service):
 
 
 class Broken(Service):
-    """Fails in its first update: by an error, one in a library, a wrong field, or one that is a sentence for users."""
+    """Fails in its first update: by an error, one in a library, or one that is a sentence for users."""
 
     def __init__(self, context: Context) -> None:
-        self.role, self.messages = context.flags["role"], context.messages
+        self.role = context.flags["role"]
 
     def update(self, now: int) -> Iterable[Any]:
         if self.role == "library":
             json.loads("[")
-        if self.role == "field":
-            return [self.messages.type("opendlv.proxy.GroundSteeringRequest")().steering]
         if self.role == "unjudgeable":
             raise UnjudgeableError("the map has no goal")
         raise ZeroDivisionError("a model\nwent wrong")
