@@ -28,27 +28,82 @@ class MessageFilter:
         return same and self.sender_stamp in (None, envelope.sender_stamp)
 
 
+def filters(names: Iterable[str], messages: MessageSet) -> tuple[MessageFilter, ...]:
+    """Messages written as ``name`` or ``name/senderStamp``; raises MessageError for one that is unknown."""
+    return tuple(MessageFilter(text, *messages.key(text)) for text in names)
+
+
 @dataclass
-class Answers:
-    """Collects the application's messages that answer a frame.
+class AnsweringApplication:
+    """Shows pictures to the application and waits for its answers; ``frames`` counts what was shown.
 
     ``required`` have to come once each, unless ``done`` comes; ``relayed`` are others that services of the test
     consume, all of which are passed on; so are those under other sender stamps, which services only count. Further
     answers to a frame are dropped.
     """
 
+    link: Exchange
     required: tuple[MessageFilter, ...]
     relayed: tuple[MessageFilter, ...] = ()
     done: MessageFilter | None = None
-    is_silent: bool = True
+    patience: Patience = PATIENCE
+    frames: int = 0
     _times: set[int] = field(default_factory=set)
     _all_times: set[int] = field(default_factory=set)
     _chosen: dict[MessageFilter, Envelope] = field(default_factory=dict)
     _others: list[Envelope] = field(default_factory=list)
     _surplus: Counter[str] = field(default_factory=Counter)
+    _is_silent: bool = True
     _is_seen: bool = False
     _is_done: bool = False
     _is_collected: bool = False
+    _is_shown: bool = False
+    _has_cameras: bool = False
+    _began: float = 0.0
+    _reading: set[str] = field(default_factory=set)
+    """Cameras whose readers do not wait for the next picture yet, where no message completes a frame."""
+
+    @property
+    def filters(self) -> tuple[MessageFilter, ...]:
+        return (*self.required, *self.relayed, *([self.done] if self.done else []))
+
+    def facts(self) -> dict[str, Any]:
+        """Nothing is measured: what it waits for a processor is not known."""
+        return {}
+
+    def start(self, now: int, cameras: Collection[str]) -> None:
+        """It may still be starting: the first picture waits for it."""
+        self._has_cameras = bool(cameras)
+
+    def begin_step(self, now: int) -> None:
+        """Without cameras, it answers what services are about to send in the step of this time (us)."""
+        if not self._has_cameras:
+            self.link.drain()
+            self.expect([now])
+            self.seen()
+
+    def show(self, shown: Sequence[Done], now: int) -> None:
+        """Announce new pictures as soon as readers wait for them; raises TestEnded."""
+        self._is_shown = bool(shown) or not self._has_cameras
+        self.frames += self._is_shown
+        self._began = time.monotonic()
+        if shown:
+            self.expect(camera.sampled for camera in shown)
+        for camera in shown:
+            if not camera.awaited:
+                self._go(camera.service, Show(awaits=True, announces=False))
+            self.link.drain()  # what the application has sent before it can see the picture
+            self.seen()
+            self._go(camera.service, Show(awaits=False, announces=True))
+        if not (self.required or self.done):
+            self._reading = {camera.service for camera in shown}
+            for name in self._reading:
+                self.link.send(name, Show(awaits=True, announces=False))
+
+    def _go(self, camera: str, command: Show) -> None:
+        self.link.send(camera, command)
+        while self.link.result(camera) is None and not self.link.stopped():
+            self._pump([camera], f"no reader waited for a picture of '{camera}'")
 
     def expect(self, times: Iterable[int]) -> None:
         """A frame will be shown, with these sample times (us): answers that copy one of them count at once."""
@@ -74,7 +129,7 @@ class Answers:
         if self.done is not None and self.done.matches(envelope) and not stale:
             self._is_done = True
         is_own = any(each.matches(envelope) for each in self.filters)
-        self.is_silent &= not is_own
+        self._is_silent &= not is_own
         for each in self.required:
             if each.matches(envelope):
                 if stale or each in self._chosen or self._is_collected:
@@ -93,101 +148,20 @@ class Answers:
             sent = f"sent more than {MOST_SURPLUS} {message}s that nobody asked for"
             raise ApplicationFails(f"the application {sent} within a frame: it floods the bus")
 
-    @property
-    def filters(self) -> tuple[MessageFilter, ...]:
-        return (*self.required, *self.relayed, *([self.done] if self.done else []))
-
-    @property
-    def is_expected(self) -> bool:
-        return bool(self.required) or self.done is not None
-
-    @property
-    def missing(self) -> list[str]:
-        if self.done is not None:
-            return [] if self._is_done else [self.done.name]
-        return [each.name for each in self.required if each not in self._chosen]
-
-    def collect(self) -> list[Envelope]:
-        """The answer, in an order that does not depend on which sender was faster."""
-        others, self._others = self._others, []
-        others.sort(key=lambda e: (e.sample_time, e.data_type, e.sender_stamp))
-        was_collected, self._is_collected = self._is_collected, True
-        chosen = [] if was_collected else [self._chosen[each] for each in self.required if each in self._chosen]
-        return [*others, *chosen]
-
-
-def filters(names: Iterable[str], messages: MessageSet) -> tuple[MessageFilter, ...]:
-    """Messages written as ``name`` or ``name/senderStamp``; raises MessageError for one that is unknown."""
-    return tuple(MessageFilter(text, *messages.key(text)) for text in names)
-
-
-@dataclass
-class AnsweringApplication:
-    """Shows pictures to the application and waits for its answers; ``frames`` counts what was shown."""
-
-    answers: Answers
-    link: Exchange
-    patience: Patience = PATIENCE
-    frames: int = 0
-    _began: float = 0.0
-    _has_cameras: bool = False
-    _is_shown: bool = False
-    _reading: set[str] = field(default_factory=set)
-    """Cameras whose readers do not wait for the next picture yet, where no message completes a frame."""
-
-    def facts(self) -> dict[str, Any]:
-        """Nothing is measured: what it waits for a processor is not known."""
-        return {}
-
-    def start(self, now: int, cameras: Collection[str]) -> None:
-        """It may still be starting: the first picture waits for it."""
-        self._has_cameras = bool(cameras)
-
-    def expect(self, now: int) -> None:
-        """Without cameras, it answers what services are about to send in the step of this time (us)."""
-        if not self._has_cameras:
-            self.link.drain()
-            self.answers.expect([now])
-            self.answers.seen()
-
-    def show(self, shown: Sequence[Done], now: int) -> None:
-        """Announce new pictures as soon as readers wait for them; raises ApplicationFails."""
-        self._is_shown = bool(shown) or not self._has_cameras
-        self.frames += self._is_shown
-        self._began = time.monotonic()
-        if shown:
-            self.answers.expect(camera.sampled for camera in shown)
-        for camera in shown:
-            if not camera.awaited:
-                self._go(camera.service, Show(awaits=True, announces=False))
-            self.link.drain()  # what the application has sent before it can see the picture
-            self.answers.seen()
-            self._go(camera.service, Show(awaits=False, announces=True))
-        if not self.answers.is_expected:
-            self._reading = {camera.service for camera in shown}
-            for name in self._reading:
-                self.link.send(name, Show(awaits=True, announces=False))
-
-    def _go(self, camera: str, command: Show) -> None:
-        self.link.send(camera, command)
-        while self.link.result(camera) is None and not self.link.stopped():
-            self._pump([camera], f"no reader waited for a picture of '{camera}'")
-
     def await_answer(self, until: int) -> None:
-        """Wait for the answer to what was shown; raises ApplicationFails.
+        """Wait for the answer to what was shown; raises TestEnded."""
+        while self._is_shown and not self.link.stopped() and (what := self.missing()):
+            self._pump(self._reading, what, silent=self._is_silent)
 
-        Where no message is one, it is there when the readers wait for the next picture.
-        """
-        while self._is_shown and not self.link.stopped():
-            if self.answers.is_expected:
-                missing = " and ".join(name.rpartition(".")[2] for name in self.answers.missing)
-                what = f"{missing} missing" if missing else ""
-            else:
-                self._reading = {name for name in self._reading if self.link.result(name) is None}
-                what = f"no reader waited for the next picture of '{min(self._reading)}'" if self._reading else ""
-            if not what:
-                return
-            self._pump(self._reading, what, silent=self.answers.is_silent)
+    def missing(self) -> str:
+        """What of the answer is; where no message is one, it is there when readers wait for the next picture."""
+        if self.required or self.done:
+            missing = [each.name for each in self.required if each not in self._chosen]
+            if self.done is not None:
+                missing = [] if self._is_done else [self.done.name]
+            return " and ".join(name.rpartition(".")[2] for name in missing) + " missing" * bool(missing)
+        self._reading = {name for name in self._reading if self.link.result(name) is None}
+        return f"no reader waited for the next picture of '{min(self._reading)}'" if self._reading else ""
 
     def _pump(self, cameras: Collection[str], what: str, *, silent: bool = False) -> None:
         """Take a message of the bus or an answer of a camera; ``what`` is missing when the time is over."""
@@ -200,4 +174,9 @@ class AnsweringApplication:
         self.link.pump(left, cameras)
 
     def collect(self) -> list[Envelope]:
-        return self.answers.collect()
+        """The answer, in an order that does not depend on which sender was faster."""
+        others, self._others = self._others, []
+        others.sort(key=lambda e: (e.sample_time, e.data_type, e.sender_stamp))
+        was_collected, self._is_collected = self._is_collected, True
+        chosen = [] if was_collected else [self._chosen[each] for each in self.required if each in self._chosen]
+        return [*others, *chosen]

@@ -51,7 +51,7 @@ class Stepper:
         """Until all evaluators have ended; raises TestEnded."""
         self._deliver([begin._replace(sample_time=EPOCH, received=0)], "")
         while not self.link.stopped():
-            self.application.expect(self.now)
+            self.application.begin_step(self.now)
             going = [done for name in (*self.roles.advance, *self.roles.sense) for done in self._go((name,), self.now)]
             if self._is_over():
                 return

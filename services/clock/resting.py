@@ -5,8 +5,9 @@ import re
 import statistics
 import time
 from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -32,49 +33,6 @@ _NS = 1000
 _MOST_NOTES = 64
 
 
-class SentMessages:
-    """Collects all that the application sends and services consume, under any sender stamp, as they count those.
-
-    ``answers`` counts the steps in which it sent something, ``uncopied`` those of them but the first in which that did
-    not carry the sample time of the last frame.
-    """
-
-    def __init__(self, filters: Sequence[MessageFilter]) -> None:
-        self.filters = filters
-        self.answers = self.uncopied = 0
-        self.names = {each.data_type: each.name.partition("/")[0].rpartition(".")[2] for each in filters}
-        self._frames: set[int] = set()
-        self._sent: list[Envelope] = []
-        self._counts = Counter[int]()
-
-    def expect(self, sampled: Iterable[int]) -> None:
-        """Frames with these sample times (us) are shown, and to be answered."""
-        self._frames = {*sampled}
-
-    def take(self, envelope: Envelope) -> None:
-        """Take a message from the bus; raises ApplicationFails."""
-        if (name := self.names.get(envelope.data_type)) is None:
-            return
-        self._counts[envelope.data_type] += 1
-        if self._counts[envelope.data_type] > MOST_SENT:
-            raise ApplicationFails(
-                f"the application sent more than {MOST_SENT} {name}s within a step: it floods the bus"
-            )
-        self._sent.append(envelope)
-
-    def collect(self, after: int, until: int) -> list[Envelope]:
-        """What was sent, by the application's own time, which lies in the step that begins ``after`` a time (us).
-
-        It counts from the next microsecond on, so that it acts on no update of the time at which it was sent.
-        """
-        sent, self._sent = self._sent, []
-        self._counts.clear()
-        own = [envelope for envelope in sent if any(each.matches(envelope) for each in self.filters)]
-        self.answers += bool(own)
-        self.uncopied += self.answers > 1 and any(envelope.sample_time not in self._frames for envelope in own)
-        return [envelope._replace(received=min(max(envelope.sent, after) + 1, until)) for envelope in sent]
-
-
 @dataclass
 class ResponseTimes:
     """What the application computed for its answers, without the first, for which programs load their libraries.
@@ -84,28 +42,28 @@ class ResponseTimes:
 
     period_s: float = 0.1
     limit_s: float | None = None
-    _taken: list[float] = field(default_factory=list)
-    _frames: list[int] = field(default_factory=list)
+    _answers: list[tuple[float, int, bool]] = field(default_factory=list)
 
-    def add(self, frame: int, taken_s: float) -> None:
-        self._taken.append(taken_s)
-        self._frames.append(frame)
+    def add(self, frame: int, taken_s: float, *, is_copied: bool = True) -> None:
+        """An answer to a frame, whether it carried the sample time of that."""
+        self._answers.append((taken_s, frame, is_copied))
 
     def facts(self) -> dict[str, Any]:
         """What the clock reports: numbers in s, none without an answer; ``over`` counts answers beyond the limit."""
-        taken = self._taken[1:]
-        if not taken:
+        answers = self._answers[1:]
+        if not answers:
             return {}
-        ordered = sorted(taken)
+        taken = sorted(taken_s for taken_s, _, _ in answers)
         return {
             "answers": len(taken),
             "period_s": self.period_s,
             "median_s": statistics.median(taken),
-            "p95_s": ordered[math.ceil(0.95 * len(ordered)) - 1],
-            "worst_s": ordered[-1],
+            "p95_s": taken[math.ceil(0.95 * len(taken)) - 1],
+            "worst_s": taken[-1],
             "slow": sum(each > self.period_s for each in taken),
-            "worst_frame": self._frames[1 + taken.index(ordered[-1])],
+            "worst_frame": max(answers, key=itemgetter(0))[1],
             "over": None if self.limit_s is None else sum(each > self.limit_s for each in taken),
+            "uncopied": sum(not is_copied for _, _, is_copied in answers),
             "processor": processor_name(),
         }
 
@@ -124,17 +82,22 @@ def processor_name() -> str:
 class RestingApplication:
     """Lets the application go on from step to step, and shows pictures when they are due; ``frames`` counts steps.
 
-    ``names`` are those of its services; its ``lines`` are messages.
+    It collects all that the application sends and services consume, by ``filters``, under any sender stamp, as they
+    count those. ``names`` are those of its services; its ``lines`` are messages.
     """
 
-    answers: SentMessages
-    agent: TimeAgent
     link: Exchange
+    filters: Sequence[MessageFilter]
+    agent: TimeAgent
     response: ResponseTimes
     names: Sequence[str] = ()
     lines: PrintedLines | None = None
     patience: Patience = PATIENCE
     frames: int = 0
+    _sampled: set[int] = field(default_factory=set)
+    """Sample times of the frames that were shown last."""
+    _sent: list[Envelope] = field(default_factory=list)
+    _counts: Counter[int] = field(default_factory=Counter)
     _noted: set[str] = field(default_factory=set)
     _unread: set[str] = field(default_factory=set)
     """Cameras whose pictures nobody has waited for yet."""
@@ -148,8 +111,7 @@ class RestingApplication:
     def facts(self) -> dict[str, Any]:
         for camera in sorted(self._unread if self.frames else ()):
             self._note_once(f"no program of the application waited for a frame of '{camera}'")
-        facts = self.response.facts()
-        return facts and {**facts, "uncopied": self.answers.uncopied}
+        return self.response.facts()
 
     def start(self, now: int, cameras: Collection[str]) -> None:
         """Let it start at a time (us), until it rests; raises TestEnded."""
@@ -157,7 +119,7 @@ class RestingApplication:
         self._shown_at = now
         self._run(now)
 
-    def expect(self, now: int) -> None:
+    def begin_step(self, now: int) -> None:
         """What it sends counts at its own time, whatever services send."""
 
     def show(self, shown: Sequence[Done], now: int) -> None:
@@ -169,7 +131,7 @@ class RestingApplication:
         self._shown_at, self._taken_s = now, 0.0
         self._run(now + EXPOSED_US)
         if shown:
-            self.answers.expect(camera.sampled for camera in shown)
+            self._sampled = {camera.sampled for camera in shown}
         self._held = [camera.service for camera in shown]
         self._announce()
 
@@ -194,13 +156,32 @@ class RestingApplication:
             self._announce()
         self._run(until)
 
+    def take(self, envelope: Envelope) -> None:
+        """Take a message from the bus; raises ApplicationFails."""
+        name = next((each.name for each in self.filters if each.data_type == envelope.data_type), "")
+        if not name:
+            return
+        self._counts[envelope.data_type] += 1
+        if self._counts[envelope.data_type] > MOST_SENT:
+            message = name.partition("/")[0].rpartition(".")[2]
+            raise ApplicationFails(
+                f"the application sent more than {MOST_SENT} {message}s within a step: it floods the bus"
+            )
+        self._sent.append(envelope)
+
     def collect(self) -> list[Envelope]:
-        """The application's messages since the last time, for the services, in the order in which they were sent."""
-        before = self.answers.answers
-        sent = self.answers.collect(self._shown_at, self._until)
-        if self.answers.answers > before or not self.answers.filters:
-            self.response.add(self.frames, self._taken_s)
-        return sent
+        """The application's messages since the last time, for the services, in the order in which they were sent.
+
+        They count from the next microsecond on, so that it acts on no update of the time at which it sent them.
+        """
+        sent, self._sent = self._sent, []
+        self._counts.clear()
+        own = [envelope for envelope in sent if any(each.matches(envelope) for each in self.filters)]
+        if own or not self.filters:
+            is_copied = all(envelope.sample_time in self._sampled for envelope in own)
+            self.response.add(self.frames, self._taken_s, is_copied=is_copied)
+        begin, end = self._shown_at, self._until
+        return [envelope._replace(received=min(max(envelope.sent, begin) + 1, end)) for envelope in sent]
 
     def _run(self, until: int) -> None:
         began = time.monotonic()

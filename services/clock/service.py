@@ -15,11 +15,11 @@ from services.base.lockstep_clock import EPOCH
 from services.base.members import SenderTable
 from services.base.runner import tell
 from services.clock.agent import TimeAgent
-from services.clock.answers import AnsweringApplication, Answers, filters
+from services.clock.answers import AnsweringApplication, filters
 from services.clock.exchange import Exchange, Roles, TestEnded
 from services.clock.model import Stepper
 from services.clock.printed_lines import PrintedLines
-from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
+from services.clock.resting import ResponseTimes, RestingApplication
 
 _REPORT_S = 0.1
 """Seconds between reports: what was measured by the wall clock is put to the test's time by them."""
@@ -40,8 +40,7 @@ class ClockService(Service):
         roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
         self._exchange = Exchange(self._session, socket_path(), roles.all, self._take, self._over, self._senders)
         self._application = self._application_of(context)
-        self._answers = self._application.answers
-        self._session.hear_only([*(each.data_type for each in self._answers.filters), *self._senders.ids])
+        self._session.hear_only([*(each.data_type for each in self._application.filters), *self._senders.ids])
         period, timeout = period_of(flags["freq"]), round(flags["timeout"] * MICROSECONDS)
         self._stepper = Stepper(roles, period, timeout, self._application, self._exchange)
         self._reported = self._begun = 0.0
@@ -53,15 +52,14 @@ class ClockService(Service):
         flags = context.flags
         required, relayed = (filters(flags[name], context.messages) for name in ("answers", "hears"))
         done = filters([flags["done"]], context.messages)[0] if flags["done"] else None
-        answers = Answers(required, relayed, done)
+        answering = AnsweringApplication(self._exchange, required, relayed, done)
         if not flags["time-folder"] or os.environ.get("DODO_ANSWERS"):
-            return AnsweringApplication(answers, self._exchange)
+            return answering
         agent = TimeAgent(Path(flags["time-folder"]))
         context.resources.callback(agent.close)
         agent.open()  # before an application could find it
-        response = ResponseTimes(1 / flags["freq"], flags["max-response"])
-        sent, names = SentMessages(answers.filters), flags["application"]
-        return RestingApplication(sent, agent, self._exchange, response, names, self._lines)
+        response, names = ResponseTimes(1 / flags["freq"], flags["max-response"]), flags["application"]
+        return RestingApplication(self._exchange, answering.filters, agent, response, names, self._lines)
 
     def _drive(self, stopped: Callable[[], bool]) -> None:
         self._stopped = stopped
@@ -90,11 +88,11 @@ class ClockService(Service):
         if self._lines and self._lines.take(envelope):
             return
         takers = self._stepper.takers(envelope.data_type)
-        if takers and any(each.matches(envelope) for each in self._answers.filters):
+        if takers and any(each.matches(envelope) for each in self._application.filters):
             with suppress(MessageError):  # its takers say so
                 message = self._session.messages.decode(envelope.data_type, envelope.payload)
                 self._senders.check_numbers(message, envelope.sender_stamp, takers, self._stepper.now - EPOCH)
-        self._answers.take(envelope)
+        self._application.take(envelope)
 
     def _over(self) -> bool:
         if self._begun and time.monotonic() - self._reported > _REPORT_S:

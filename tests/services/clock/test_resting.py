@@ -23,7 +23,7 @@ from services.clock.agent import TimeAgent
 from services.clock.answers import filters
 from services.clock.exchange import ApplicationFails, Exchange, Patience, ServiceSilent
 from services.clock.printed_lines import PrintedLines
-from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
+from services.clock.resting import ResponseTimes, RestingApplication
 from tests.services.clock.toys import STEER, STEP, Toys
 
 Answer = Callable[[int], list[object]]
@@ -89,21 +89,18 @@ def steering(sent: int, sampled: int = 5, stamp: int = 0) -> Envelope:
     return Envelope(MESSAGES.id(STEER), b"", sent, 1, sampled, stamp)
 
 
-def application(
-    agent: TimeAgent, sent: SentMessages | None = None, link: object = None, lines: object = None
-) -> RestingApplication:
-    heard, known = sent or SentMessages(filters([STEER], MESSAGES)), cast(Exchange, link or Link())
+def application(agent: TimeAgent, link: object = None, lines: object = None) -> RestingApplication:
+    heard, known = filters([f"{STEER}/0"], MESSAGES), cast(Exchange, link or Link())
     names, printed, patience = ("driver", "eye"), cast(PrintedLines, lines), Patience(0.4, 0.2)
-    return RestingApplication(heard, agent, known, ResponseTimes(), names, printed, patience)
+    return RestingApplication(known, heard, agent, ResponseTimes(), names, printed, patience)
 
 
 def test_messages_count_when_they_were_sent_and_no_later_than_now(tmp_path: Path) -> None:
-    sent = SentMessages(filters([f"{STEER}/0"], MESSAGES))
     waiting = [steering(EPOCH - 9)]
 
     def drain() -> None:
         while waiting:
-            sent.take(waiting.pop(0))
+            driven.take(waiting.pop(0))
 
     def answer(until: int) -> list[object]:
         if until > EPOCH + resting.EXPOSED_US:
@@ -112,7 +109,7 @@ def test_messages_count_when_they_were_sent_and_no_later_than_now(tmp_path: Path
         return [reached(until)]
 
     with agent(tmp_path, answer) as time:
-        driven = application(time, sent, Link(drain))
+        driven = application(time, Link(drain))
         driven.start(EPOCH, ())
         assert not waiting
         driven.show((), EPOCH)
@@ -200,7 +197,6 @@ def test_a_destroyed_page_fails_the_application_and_an_agent_that_ends_does_not(
 
 def test_what_is_computed_for_each_answer_is_measured(tmp_path: Path) -> None:
     """By the agent; by the wall clock where a process has ended, whose last part is not known."""
-    sent = SentMessages(filters([STEER], MESSAGES))
     ran = iter([(0.5, False), (0.0, False), (0.0, False), *[(1e-6, False)] * 2, (9.0, False), (0.0, True)])
 
     def answer(until: int) -> list[object]:
@@ -208,11 +204,11 @@ def test_what_is_computed_for_each_answer_is_measured(tmp_path: Path) -> None:
         return [reached(until, ran_s=seconds, has_ended=has_ended)]
 
     with agent(tmp_path, answer) as time:
-        driven = application(time, sent)
+        driven = application(time)
         driven.start(EPOCH, ())
         for step in range(3):
             driven.show((), EPOCH + step * STEP)
-            sent.take(steering(EPOCH + step * STEP))
+            driven.take(steering(EPOCH + step * STEP))
             driven.await_answer(EPOCH + (step + 1) * STEP)
             driven.collect()
     facts = driven.facts()

@@ -16,7 +16,7 @@ from services.base import Context
 from services.base.flags import load_manifest, parse
 from services.base.members import VARIABLE, SenderTable
 from services.clock import exchange
-from services.clock.answers import Answers
+from services.clock.answers import AnsweringApplication
 from services.clock.exchange import Exchange
 from services.clock.service import ClockService
 from tests.services.process import ROOT
@@ -126,14 +126,14 @@ def test_a_number_of_the_application_that_is_not_finite_is_reported_once(
         it._exchange.close()
         it._stepper._consumed = {"track": frozenset({steering}), "vehicle": frozenset({steering})}
         it._stepper.now += 700_000
-        answers = cast(Answers, it._answers)
+        answers = cast(AnsweringApplication, it._application)
         answers.expect([5])
         sent = [(steering, math.nan, 7), (pedal, math.nan, 0), *[(steering, -math.inf, 0)] * 2]
         for id_, value, stamp in sent:
             message = session.messages.type(session.messages.name(id_))()
             setattr(message, message.DESCRIPTOR.fields[0].name, value)
             it._take(Envelope(id_, session.messages.encode(message), 5, 0, 5, stamp))
-        assert answers.missing == []
+        assert not answers.missing()
     assert [json.loads(line)["reason"] for line in capsys.readouterr().out.splitlines()] == [
         f"the application sent {STEERING}/0 to 'vehicle' and 'track' after 0.70 s: "
         "groundSteering is -inf, not a finite number"

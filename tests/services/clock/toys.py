@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from services.base import Service, Verdict
@@ -20,10 +21,10 @@ from services.base.lockstep_clock import EPOCH, LockstepClock
 from services.base.loop import Loop
 from services.base.members import SenderTable
 from services.clock.agent import TimeAgent
-from services.clock.answers import AnsweringApplication, Answers, filters
+from services.clock.answers import AnsweringApplication, filters
 from services.clock.exchange import Exchange, Patience, Roles
 from services.clock.model import Stepper
-from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
+from services.clock.resting import ResponseTimes, RestingApplication
 
 STEP = 100_000
 STEER, PLACE = "opendlv.proxy.GroundSteeringRequest", "opendlv.sim.Frame"
@@ -200,17 +201,16 @@ class Toys:
             with Session(self.cid) as session, ExitStack() as resources:
                 path = Path(resources.enter_context(tempfile.TemporaryDirectory()), "clock")
                 messages = session.messages
-                required, relayed = (filters(names, messages) for names in (self.answers, self.relayed))
-                answers: Answers | SentMessages = Answers(required, relayed)
-                if self.agent:
-                    answers = SentMessages(answers.filters)
-                senders = SenderTable(messages)
-                link = Exchange(session, path, makers, answers.take, stop.is_set, senders)
+
+                def take(envelope: Envelope) -> None:
+                    application.take(envelope)
+
+                link = Exchange(session, path, makers, take, stop.is_set, SenderTable(messages))
                 exchange = resources.enter_context(closing(link))
+                application = self._under_test(messages, exchange)
                 advance = tuple(name for name in self.cast if name == "mover")
                 sense = tuple(name for name in self.cast if name not in advance)
                 roles = Roles(advance, sense, ("judge",))
-                application = self._under_test(answers, exchange)
                 stepper = Stepper(roles, STEP, self.timeout, application, exchange)
                 with self._services(stop, makers, path):
                     for app in apps:
@@ -223,10 +223,11 @@ class Toys:
                 app.join()
         return self.evaluator.path, stepper
 
-    def _under_test(self, answers: Any, link: Exchange) -> Any:
+    def _under_test(self, messages: MessageSet, link: Exchange) -> AnsweringApplication | RestingApplication:
+        required, relayed = (filters(names, messages) for names in (self.answers, self.relayed))
         if self.agent:
-            return RestingApplication(answers, self.agent, link, ResponseTimes(), ("toy",))
-        return AnsweringApplication(answers, link, self.patience)
+            return RestingApplication(link, required, self.agent, ResponseTimes(), ("toy",))
+        return AnsweringApplication(link, required, relayed, patience=self.patience)
 
     @contextmanager
     def _services(self, stop: threading.Event, makers: dict[str, Maker], path: Path) -> Iterator[None]:
