@@ -20,7 +20,7 @@ from services.base.clock import Clock, RealTimeClock
 from services.base.flags import Flags, FlagsError, load_manifest, parse
 from services.base.loop import Loop
 from services.base.members import Members, SenderTable, World, channel
-from services.base.runner import connected, say, tell
+from services.base.runner import connect, say, tell
 from services.base.service import Build, Context, Service
 
 _OURS = ("dodo_dsl.", "services.")
@@ -54,7 +54,8 @@ def run(folder: Path, build: Build, clock: Clock | None = None) -> int:
     logging.basicConfig(stream=sys.stderr, level=level, format=f"{name}: %(levelname)s: %(message)s")
     role = os.environ.get("DODO_SERVICE") or name
     signals: list[int] = []
-    with _handled(lambda number, _: signals.append(number)), connected(channel(), role):
+    connect(channel(), role)
+    with _handled(lambda number, _: signals.append(number)):
         return _serve(role, manifest, folder, build, flags, clock, lambda: bool(signals))
 
 
@@ -65,11 +66,7 @@ def main(file: str, build: Build, clock: Clock | None = None) -> NoReturn:
 
 def interruptible() -> AbstractContextManager[None]:
     """A signal ends the service at once with code 0, and closes its resources; only in the main thread."""
-
-    def leave(_number: int, _frame: object) -> None:
-        raise SystemExit(0)
-
-    return _handled(leave)
+    return _handled(lambda *_: sys.exit(0))
 
 
 @contextmanager
@@ -110,7 +107,10 @@ def _serve(
             code = BROKEN
             if place and (service.drive or service.observe or not os.environ.get("DODO_CLOCK")):
                 session.hear_directly()
-            resources.enter_context(_readiness(place, role, session))
+            if place:
+                address_book.enter(place, role, session.address)
+                resources.callback(address_book.leave, place, role, session.address)
+            tell("ready")
             try:
                 (service.drive or loop.run)(stop)
             finally:
@@ -168,19 +168,6 @@ def _membership(session: Session, role: str) -> Members | None:
     if os.environ.get("DODO_CLOCK") or not (senders.by_message or world.names):
         return None
     return Members(session, role, senders, world)
-
-
-@contextmanager
-def _readiness(folder: Path | None, role: str, session: Session) -> Iterator[None]:
-    """Report that the service is ready, and where it is, as long as it is; raises OSError."""
-    if folder:
-        address_book.enter(folder, role, session.address)
-    try:
-        tell("ready")
-        yield
-    finally:
-        if folder:
-            address_book.leave(folder, role, session.address)
 
 
 def stop_without_master() -> None:

@@ -1,8 +1,7 @@
 """What a service reports to the runner: over the test's channel, or by lines of its output where no runner listens."""
 
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import suppress
 from pathlib import Path
 
 from dodo_dsl.opendlv.packets import RUNNER_SOCKET, Connection
@@ -10,20 +9,11 @@ from dodo_dsl.opendlv.packets import RUNNER_SOCKET, Connection
 _runner: Connection | None = None
 
 
-@contextmanager
-def connected(folder: Path | None, service: str) -> Iterator[None]:
-    """Within the block, a runner that listens in the folder hears what is reported."""
+def connect(folder: Path | None, service: str) -> None:
+    """From now on a runner that listens in the folder hears what is reported."""
     global _runner  # noqa: PLW0603  (a process is one service)
-    try:
+    with suppress(OSError):  # run by hand, or by an engine on another machine
         _runner = Connection.open(folder / RUNNER_SOCKET, service) if folder else None
-    except OSError:  # run by hand, or by an engine on another machine
-        _runner = None
-    try:
-        yield
-    finally:
-        if _runner is not None:
-            _runner.close()
-            _runner = None
 
 
 def tell(kind: str, **facts: object) -> None:
