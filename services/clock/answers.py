@@ -9,7 +9,8 @@ from typing import Any
 from dodo_dsl.opendlv.channel import Done, Show
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
-from services.clock.exchange import PATIENCE, WALL_FACTOR, ApplicationFails, Exchange, Patience
+from services.clock import exchange
+from services.clock.exchange import ApplicationFails, Exchange
 
 MOST_SURPLUS = 100
 """Surplus messages of one kind to a frame; more of them are a flood that would keep others from the bus."""
@@ -46,7 +47,6 @@ class AnsweringApplication:
     required: tuple[MessageFilter, ...]
     relayed: tuple[MessageFilter, ...] = ()
     done: MessageFilter | None = None
-    patience: Patience = PATIENCE
     frames: int = 0
     _times: set[int] = field(default_factory=set)
     _all_times: set[int] = field(default_factory=set)
@@ -165,7 +165,7 @@ class AnsweringApplication:
 
     def _pump(self, cameras: Collection[str], what: str, *, silent: bool = False) -> None:
         """Take a message of the bus or an answer of a camera; ``what`` is missing when the time is over."""
-        limit = self.patience.first if self.frames == 1 else WALL_FACTOR * self.patience.others
+        limit = exchange.FIRST_PATIENCE if self.frames == 1 else exchange.WALL_FACTOR * exchange.PATIENCE
         left = self._began + limit - time.monotonic()
         if left <= 0:
             raise ApplicationFails(

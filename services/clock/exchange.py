@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 from dodo_dsl.opendlv.address import LINES, Address
 from dodo_dsl.opendlv.address_book import RUNNER
@@ -21,6 +20,10 @@ START_PATIENCE = 240.0
 """Wall time in s for all services to connect, as the clock begins while others still start: layer after layer."""
 SERVICE_PATIENCE = 60.0
 """Wall time in s that services of the test have for a step; none takes nearly as long."""
+FIRST_PATIENCE, PATIENCE = 30.0, 2.0
+"""Processor time in s that the application may compute without a wait, at its start and later."""
+WALL_FACTOR = 10.0
+"""How many times its patience it may take of wall time: others may have the processor."""
 
 
 class TestEnded(Exception):
@@ -120,20 +123,21 @@ class Exchange:
 
     def _take_from_bus(self) -> bool:
         envelope = self._session.receive(0.0)
-        if envelope is None:
-            return False
-        if not self._session.was_direct or self._session.source == self._senders.address(RUNNER):
+        if envelope is not None:
             self.hear(envelope, self._session.source)
-        return True
+        return envelope is not None
 
     def hear(self, envelope: Envelope, source: Address) -> None:
         """Take a message from the bus; the addresses of all services are known."""
-        if source not in self._own and self._senders.is_of_runner(envelope, source):
-            producers = self._senders.producers(envelope)
-            if producers is None or (LINES in producers.services and source == self._senders.address(RUNNER)):
-                self._take_other(envelope)
-            else:
-                self._senders.report(producers.reason)
+        if source in self._own or not self._senders.is_of_runner(envelope, source):
+            return
+        is_runner, producers = source == self._senders.address(RUNNER), self._senders.producers(envelope)
+        if self._session.was_direct and not is_runner:
+            return
+        if producers is None or (LINES in producers.services and is_runner):
+            self._take_other(envelope)
+        else:
+            self._senders.report(producers.reason)
 
     def close(self) -> None:
         self._listener.close()
@@ -153,16 +157,3 @@ class Roles:
     @property
     def all(self) -> tuple[str, ...]:
         return (*self.advance, *self.sense, *self.judge, *self.watch)
-
-
-class Patience(NamedTuple):
-    """Processor time in s that the application may compute without a wait, at its start and later."""
-
-    first: float = 30.0
-    others: float = 2.0
-
-
-PATIENCE = Patience()
-
-WALL_FACTOR = 10.0
-"""How many times its patience it may take of wall time: others may have the processor."""

@@ -14,9 +14,10 @@ from typing import Any
 from dodo_dsl.opendlv.channel import Done, Show
 from dodo_dsl.opendlv.envelope import Envelope
 from services.base.runner import tell
+from services.clock import exchange
 from services.clock.agent import Busy, Report, TimeAgent
 from services.clock.answers import MessageFilter
-from services.clock.exchange import PATIENCE, SLICE_S, WALL_FACTOR, ApplicationFails, Exchange, Patience, ServiceSilent
+from services.clock.exchange import SLICE_S, WALL_FACTOR, ApplicationFails, Exchange, ServiceSilent
 from services.clock.printed_lines import PrintedLines
 
 MOST_SENT = 1000
@@ -92,7 +93,6 @@ class RestingApplication:
     response: ResponseTimes
     names: Sequence[str] = ()
     lines: PrintedLines | None = None
-    patience: Patience = PATIENCE
     frames: int = 0
     _sampled: set[int] = field(default_factory=set)
     """Sample times of the frames that were shown last."""
@@ -229,7 +229,7 @@ class RestingApplication:
 
     @property
     def _limit(self) -> float:
-        return self.patience.first if self.frames <= 1 else self.patience.others
+        return exchange.FIRST_PATIENCE if self.frames <= 1 else exchange.PATIENCE
 
     def _refuse_busy(self, busy: Busy) -> None:
         """Raises ApplicationFails where a thread has computed, or not come to wait, for too long."""

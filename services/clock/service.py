@@ -16,14 +16,13 @@ from services.base.members import SenderTable
 from services.base.runner import tell
 from services.clock.agent import TimeAgent
 from services.clock.answers import AnsweringApplication, filters
-from services.clock.exchange import Exchange, Roles, TestEnded
+from services.clock.exchange import SLICE_S, Exchange, Roles, TestEnded
 from services.clock.model import Stepper
 from services.clock.printed_lines import PrintedLines
 from services.clock.resting import ResponseTimes, RestingApplication
 
 _REPORT_S = 0.1
 """Seconds between reports: what was measured by the wall clock is put to the test's time by them."""
-_SLICE = 0.05
 BEGIN = "dodo.TestBegin"
 
 
@@ -43,6 +42,7 @@ class ClockService(Service):
         self._session.hear_only([*(each.data_type for each in self._application.filters), *self._senders.ids])
         period, timeout = period_of(flags["freq"]), round(flags["timeout"] * MICROSECONDS)
         self._stepper = Stepper(roles, period, timeout, self._application, self._exchange)
+        self._begin: Envelope | None = None
         self._reported = self._begun = 0.0
         self._stopped: Callable[[], bool] = lambda: False
         self.drive = self._drive
@@ -85,6 +85,8 @@ class ClockService(Service):
             tell("stopped", how=ended.kind, reason=str(ended), silent=ended.silent)
 
     def _take(self, envelope: Envelope) -> None:
+        if envelope.data_type == self._begin_id:
+            self._begin = envelope
         if self._lines and self._lines.take(envelope):
             return
         takers = self._stepper.takers(envelope.data_type)
@@ -105,16 +107,10 @@ class ClockService(Service):
             begin = self._session.messages.type(BEGIN)()
             return Envelope(self._begin_id, self._session.messages.encode(begin), 0, 0, 0, 0)
         tell("started")
-        while not self._stopped():
-            envelope = self._session.receive(_SLICE)
-            if envelope is None:
-                continue
-            if envelope.data_type == self._begin_id and self._senders.is_of_runner(envelope, self._session.source):
-                self._session.hear_directly(self._lines is not None)
-                return envelope
-            if not self._session.was_direct:
-                self._exchange.hear(envelope, self._session.source)
-        return None
+        while self._begin is None and not self._stopped():
+            self._exchange.pump(SLICE_S)
+        self._session.hear_directly(self._lines is not None)
+        return self._begin
 
     def _report_time(self, last: bool = False) -> None:
         self._reported = time.monotonic()

@@ -87,7 +87,10 @@ def test_each_update_shares_a_picture(names: list[str], video: Path) -> None:
         (["--source=/dev/null"], "the camera /dev/null cannot be opened"),
         (["--source=emulated"], "is the camera of 'rig: emulated'"),
         (["--source=rpicam", "--freq=20"], "--exposure=0.1 does not fit into the 0.05 s between two pictures"),
-        (["--source=file", "--width=63"], "argument --width: '63', expected integer, at least 2, at most 8192, a multiple of 2"),
+        (
+            ["--source=file", "--width=63"],
+            "argument --width: '63', expected integer, at least 2, at most 8192, a multiple of 2",
+        ),
     ],
 )
 def test_what_is_not_a_camera(names: list[str], flags: list[str], words: str) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from services.base.lockstep_clock import EPOCH
 from services.clock import exchange
-from services.clock.exchange import ApplicationFails, Patience, ServiceSilent, TimeOver
+from services.clock.exchange import ApplicationFails, ServiceSilent, TimeOver
 from services.clock.model import Stepper
 from tests.services.clock.toys import BOX, DRIVE, STEP, Filter, Mover, Toys
 
@@ -100,14 +100,15 @@ def test_a_service_that_does_not_answer_is_named(toys: Toys, monkeypatch: pytest
 @pytest.mark.parametrize(
     ("patience", "manner", "said"),
     [
-        (Patience(0.5, 0.2), {"times": 0}, "frame 1 within 0.5 s (GroundSteeringRequest missing)"),
-        (Patience(2.0, 0.02), {"most": 7}, "frame 8 within 0.2 s (no reader waited for a picture of 'eye')"),
+        ((0.5, 0.2), {"times": 0}, "frame 1 within 0.5 s (GroundSteeringRequest missing)"),
+        ((2.0, 0.02), {"most": 7}, "frame 8 within 0.2 s (no reader waited for a picture of 'eye')"),
     ],
 )
 def test_silence_is_named_with_frame_and_cause(
-    toys: Toys, patience: Patience, manner: dict[str, Any], said: str
+    toys: Toys, monkeypatch: pytest.MonkeyPatch, patience: tuple[float, float], manner: dict[str, Any], said: str
 ) -> None:
-    toys.patience = patience
+    for name, seconds in zip(("FIRST_PATIENCE", "PATIENCE"), patience, strict=True):
+        monkeypatch.setattr(exchange, name, seconds)
     with pytest.raises(ApplicationFails, match=re.escape(said)):
         toys.run(toys.application(**manner))
 

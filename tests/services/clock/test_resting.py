@@ -18,10 +18,10 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.base.lockstep_clock import EPOCH
-from services.clock import resting
+from services.clock import exchange, resting
 from services.clock.agent import TimeAgent
 from services.clock.answers import filters
-from services.clock.exchange import ApplicationFails, Exchange, Patience, ServiceSilent
+from services.clock.exchange import ApplicationFails, Exchange, ServiceSilent
 from services.clock.printed_lines import PrintedLines
 from services.clock.resting import ResponseTimes, RestingApplication
 from tests.services.clock.toys import STEER, STEP, Toys
@@ -91,8 +91,7 @@ def steering(sent: int, sampled: int = 5, stamp: int = 0) -> Envelope:
 
 def application(agent: TimeAgent, link: object = None, lines: object = None) -> RestingApplication:
     heard, known = filters([f"{STEER}/0"], MESSAGES), cast(Exchange, link or Link())
-    names, printed, patience = ("driver", "eye"), cast(PrintedLines, lines), Patience(0.4, 0.2)
-    return RestingApplication(known, heard, agent, ResponseTimes(), names, printed, patience)
+    return RestingApplication(known, heard, agent, ResponseTimes(), ("driver", "eye"), cast(PrintedLines, lines))
 
 
 def test_messages_count_when_they_were_sent_and_no_later_than_now(tmp_path: Path) -> None:
@@ -132,7 +131,11 @@ def test_messages_count_when_they_were_sent_and_no_later_than_now(tmp_path: Path
         (2, {"processor_s": 9.0, "wall_s": -1}, ""),
     ],
 )
-def test_who_does_not_wait_is_named(tmp_path: Path, frame: int, report: dict[str, Any], sentence: str) -> None:
+def test_who_does_not_wait_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, frame: int, report: dict[str, Any], sentence: str
+) -> None:
+    monkeypatch.setattr(exchange, "FIRST_PATIENCE", 0.4)
+    monkeypatch.setattr(exchange, "PATIENCE", 0.2)
     busy = {"service": 1, "pid": 12, "tid": 13, "name": "loop", "state": "D", **report}
     steps = iter(range(9))
 

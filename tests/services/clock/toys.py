@@ -22,7 +22,7 @@ from services.base.loop import Loop
 from services.base.members import SenderTable
 from services.clock.agent import TimeAgent
 from services.clock.answers import AnsweringApplication, filters
-from services.clock.exchange import Exchange, Patience, Roles
+from services.clock.exchange import Exchange, Roles
 from services.clock.model import Stepper
 from services.clock.resting import ResponseTimes, RestingApplication
 
@@ -172,7 +172,6 @@ class Toys:
 
     cid: int
     seconds: float = 2.0
-    patience: Patience = field(default_factory=lambda: Patience(5.0, 2.0))
     answers: tuple[str, ...] = (STEER,)
     relayed: tuple[str, ...] = ()
     timeout: int = 60_000_000
@@ -227,7 +226,7 @@ class Toys:
         required, relayed = (filters(names, messages) for names in (self.answers, self.relayed))
         if self.agent:
             return RestingApplication(link, required, self.agent, ResponseTimes(), ("toy",))
-        return AnsweringApplication(link, required, relayed, patience=self.patience)
+        return AnsweringApplication(link, required, relayed)
 
     @contextmanager
     def _services(self, stop: threading.Event, makers: dict[str, Maker], path: Path) -> Iterator[None]:
