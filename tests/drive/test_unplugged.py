@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -121,28 +121,22 @@ class Run:
     folder: Path
     rig: Hardware
     runner: Runner
-    found: dict[str, int] = field(default_factory=dict)
 
-    def processes(self) -> Iterator[Path]:
+    def processes(self) -> list[Path]:
         """All of this very run; a service that was forked has the runner's variables."""
-        mine = f"DODO_RIGS={self.folder}/state".encode()
-        for entry in Path("/proc").glob("[0-9]*"):
-            with contextlib.suppress(OSError):
-                if mine in (entry / "environ").read_bytes().split(b"\0"):
-                    yield entry
+        return [
+            each for each in Path("/proc").glob("[0-9]*") if f"DODO_RIGS={self.folder}/state" in words(each, "environ")
+        ]
 
     def find(self, module: str) -> int:
-        """The one process that was started to run a module; from the second time on without a look."""
-        if module in self.found:
-            return self.found[module]
-        for entry in self.processes():
-            with contextlib.suppress(OSError):
-                if module.encode() in (entry / "cmdline").read_bytes().split(b"\0"):
-                    return self.found.setdefault(module, int(entry.name))
-        raise AssertionError(f"no process {module}")
+        """The one process that was started to run a module."""
+        return next(int(each.name) for each in self.processes() if module in words(each, "cmdline"))
 
-    def kill(self, word: str, number: signal.Signals = signal.SIGKILL) -> None:
-        os.kill(self.find(word), number)
+
+def words(process: Path, file: str) -> list[str]:
+    with contextlib.suppress(OSError):
+        return (process / file).read_bytes().decode(errors="replace").split("\0")
+    return []
 
 
 @contextlib.contextmanager
@@ -152,10 +146,10 @@ def running(folder: Path, rig: Hardware, isolation: str) -> Iterator[Run]:
     pose = {"pose": {"with": {"serial": str(rig.path), "calibrate": True, "truth-id": None}}}
     variant(registry(folder), "hil-dynamic", "unplugged", isolation=isolation, environment=camera, action=pose)
     (folder / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "registry": ["tests"]}))
-    words = ["run", "unplugged", "--backend", "process", "--application", str(KIWI / "docker-compose.yml")]
+    command = ["run", "unplugged", "--backend", "process", "--application", str(KIWI / "docker-compose.yml")]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "DODO_RIGS": str(folder / "state")}
     runner = subprocess.Popen(
-        [sys.executable, "-m", "dodo_dsl", *words],
+        [sys.executable, "-m", "dodo_dsl", *command],
         cwd=folder,
         env=environment,
         stdout=subprocess.PIPE,
@@ -225,15 +219,6 @@ WAYS = (
 )
 
 
-def pull(run: Run, verb: str, what: str) -> None:
-    if verb == "order":
-        run.rig.order(what)
-    elif what in ("rig", "runner"):
-        (run.rig.process if what == "rig" else run.runner).kill()
-    else:
-        run.kill(what, signal.SIGKILL if verb == "kill" else signal.SIGSTOP)
-
-
 def brakes(at: float, poses: list[Pose], begin: float) -> None:
     """From ``begin`` s after ``at`` on it gets only slower, and it stands v / a later."""
     first = next(pose for pose in poses if pose.t >= at + begin + SLACK)
@@ -250,10 +235,13 @@ def pull_the_plug(run: Run, way: Way) -> None:
     """Pull it as the rig drives, and see it come to rest in its own time."""
     verb, _, what = way.pull.partition(" ")
     at_its_start(run)
-    if "." in what:
-        run.find(what)  # which takes a while
+    known = {"rig": run.rig.process.pid, "runner": run.runner.pid}
+    process = 0 if verb == "order" else known.get(what) or run.find(what)
     on_its_way(run)
-    pull(run, verb, what)
+    if process:
+        os.kill(process, signal.SIGKILL if verb == "kill" else signal.SIGSTOP)
+    else:
+        run.rig.order(what)
     if way.pull == "kill rig":
         return
     at, seen = run.rig.now(), len(run.rig.poses)
@@ -270,9 +258,9 @@ def judged(run: Run) -> dict[str, Any]:
 
 def nothing_is_left(run: Run) -> bool:
     end = time.monotonic() + 60
-    while any(run.processes()) and time.monotonic() < end:
+    while run.processes() and time.monotonic() < end:
         time.sleep(0.05)
-    return not any(run.processes())
+    return not run.processes()
 
 
 @pytest.mark.usefixtures("firmware")
