@@ -15,40 +15,21 @@ _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 About = Mapping[str, Any]
 
-COMMON: dict[str, About] = {
-    "cid": {
-        "type": "integer",
-        "required": True,
-        "minimum": 1,
-        "maximum": 254,
-        "example": 128,
-        "help": "Session of the bus to join.",
-    },
-    "id": {
-        "type": "integer",
-        "default": 0,
-        "minimum": 0,
-        "maximum": 4_294_967_295,
-        "help": "Sender stamp of messages, where no parameter sets another.",
-    },
-    "ends-input": {
-        "type": "boolean",
-        "default": False,
-        "help": "End the input of all others, so that they give their verdict, with the own verdict.",
-    },
-    "verbose": {"type": "boolean", "default": False, "help": "Log more."},
-}
-
 
 def load_manifest(folder: Path) -> dict[str, Any]:
-    manifest: dict[str, Any] = yaml.load((folder / "service.yml").read_text(encoding="utf-8"), _LOADER)  # noqa: S506
-    return manifest
+    return _loaded(folder / "service.yml")
+
+
+def _loaded(file: Path) -> dict[str, Any]:
+    read: dict[str, Any] = yaml.load(file.read_text(encoding="utf-8"), _LOADER)  # noqa: S506
+    return read
 
 
 def parameters(manifest: Mapping[str, Any]) -> dict[str, About]:
     """All flags of a service, the common ones last; its own parameter replaces a common one of its name."""
     own: dict[str, About] = manifest.get("parameters") or {}
-    return {**own, **{name: about for name, about in COMMON.items() if name not in own}}
+    common = _loaded(Path(__file__).with_suffix(".yml"))
+    return own | {name: about for name, about in common.items() if name not in own}
 
 
 _LIMITS = {"minimum": "at least", "maximum": "at most", "multiple-of": "a multiple of"}
