@@ -121,8 +121,7 @@ class Judged:
     _frames: list[tuple[int, JudgedBoxes]] = field(default_factory=list)
     _boxes: int = 0
     _is_cut: bool = False
-    _messages: list[tuple[str, int | None]] = field(default_factory=list)
-    _way: dict[str, Any] = field(default_factory=dict)
+    _facts: list[dict[str, Any]] = field(default_factory=list)
 
     def series(self, name: str, unit: str = "", **limits: Any) -> Series:
         """A new series, drawn in the order in which they are made; limits by the names that ``Series`` has."""
@@ -139,14 +138,14 @@ class Judged:
 
     def message(self, name: str, sender_stamp: int | None) -> None:
         """The fields of this message are plotted, too; None for any sender."""
-        self._messages.append((name, sender_stamp))
+        self._facts.append({"message": name, "sender": sender_stamp})
 
     def way(self, frame_id: int, length: float, width: float, roles: Mapping[str, str]) -> None:
         """A vehicle of so many m whose frames come under ``frame_id``; ``roles`` of a map's obstacles by their names.
 
         A role is ``wall``, ``gate`` or ``goal``; gates are crossed in this order.
         """
-        self._way = {"frame": frame_id, "length": length, "width": width, "roles": dict(roles)}
+        self._facts.append({"way": {"frame": frame_id, "length": length, "width": width, "roles": dict(roles)}})
 
     def clear(self) -> None:
         for each in self._series:
@@ -160,17 +159,11 @@ class Judged:
             yield json.dumps({"dodo": "judged", **each}, allow_nan=False)
 
     def _all(self, parameters: Mapping[str, Sequence[str]]) -> Iterator[dict[str, Any]]:
-        if self._way:
-            yield {"way": self._way}
+        yield from self._facts
         if parameters:
             yield {"parameters": {name: list(names) for name, names in parameters.items()}}
         for series in self._series[:MOST_SERIES]:
             yield from series.lines()
-        for name, sender in self._messages:
-            yield {"message": name, "sender": sender}
-        yield from self._frame_lines()
-
-    def _frame_lines(self) -> Iterator[dict[str, Any]]:
         for time, boxes in self._frames:
             listed = [[kind, *each] for kind in ("hit", "false", "missed") for each in _shown(getattr(boxes, kind))]
             for begin in range(0, max(len(listed), 1), _BOXES_OF_A_LINE):

@@ -75,6 +75,7 @@ EPOCH = 1_700_000_000_000_000
 LONGEST = 2 * 86_400_000_000
 """Longest test, in microseconds."""
 
+Observe = Callable[[Envelope], None]
 RECORDED_STEP, RECORDING_END = "dodo.RecordedStep", "dodo.RecordingEnd"
 
 
@@ -95,21 +96,21 @@ class Observer:
         """Take what others than services sent on the bus."""
         self._collected.append(envelope)
 
-    def deliver(self, inbox: "Loop", until: int, relayed: Sequence[Envelope]) -> None:
+    def deliver(self, observe: Observe, until: int, relayed: Sequence[Envelope]) -> None:
         """Deliver all of a step (its end ``until`` in us). The answer to it waits: whether it is there is chance."""
         collected, self._collected = self._collected, []
         for envelope in collected:
             if until <= envelope.sample_time <= EPOCH + LONGEST:
                 self._collected.append(envelope)
             else:
-                inbox.observe(envelope)
+                observe(envelope)
         for envelope in self._marked(until, relayed):
-            inbox.observe(envelope)
+            observe(envelope)
 
-    def flush(self, inbox: "Loop") -> None:
+    def flush(self, observe: Observe) -> None:
         """The test is over: deliver what waits for a step that will not come."""
         for envelope in self._collected:
-            inbox.observe(envelope)
+            observe(envelope)
         self._collected = []
 
     def _marked(self, time: int, relayed: Sequence[Envelope]) -> Iterator[Envelope]:
@@ -157,12 +158,12 @@ class LockstepClock(Clock):
 
     def steps(self, period: Fraction | int, inbox: "Loop", stopped: Callable[[], bool]) -> Iterator[int]:
         """As ``Clock.steps``; messages are delivered in the order of their sample times."""
-        consumes = [] if inbox.observes else sorted(inbox.consumes)
+        consumes = [] if inbox.observe else sorted(inbox.consumes)
         self._about = About(self._address, len(self._memories), consumes)
         yield from self._steps(period, inbox, stopped)
-        if inbox.observes:
+        if inbox.observe:
             self._client.drain(self._observer.collect)
-            self._observer.flush(inbox)
+            self._observer.flush(inbox.observe)
 
     def _steps(self, period: Fraction | int, inbox: "Loop", stopped: Callable[[], bool]) -> Iterator[int]:
         number, due = 0, EPOCH
@@ -171,8 +172,8 @@ class LockstepClock(Clock):
                 if not self._show(command, stopped):
                     return
                 continue
-            if inbox.observes:
-                self._observer.deliver(inbox, command.time, command.messages)
+            if inbox.observe:
+                self._observer.deliver(inbox.observe, command.time, command.messages)
             messages = in_order(command.messages)
             while due <= command.time:
                 while messages and messages[0][0] <= due:
@@ -228,7 +229,7 @@ class LockstepClock(Clock):
             look_until(stopped)
 
     def _command(self, inbox: "Loop", stopped: Callable[[], bool]) -> Step | Show | None:
-        observe = self._observer.collect if inbox.observes else None
+        observe = self._observer.collect if inbox.observe else None
         with suppress(EOFError):
             while not stopped():
                 if command := self._client.next(observe):

@@ -134,7 +134,7 @@ class Loop:
     def _hear_rest(self) -> None:
         """An observer gets what came before its end."""
         end = time.time_ns() // 1000
-        while self.observes and not self.clock.relays and self.service.verdict is None:
+        while self.observe and not self.clock.relays and self.service.verdict is None:
             envelope = self.receive(0.0)
             if envelope is None or envelope.received > end:
                 return
@@ -144,16 +144,13 @@ class Loop:
         return self.session.receive(timeout)
 
     @property
-    def observes(self) -> bool:
-        return self.service.observe is not None
+    def observe(self) -> Callable[[Envelope], None] | None:
+        """What takes everything on the bus, where the service does."""
+        return self.service.observe
 
     @property
     def consumes(self) -> frozenset[int]:
         return frozenset([*self._handlers, self._begin, self._end])
-
-    def observe(self, envelope: Envelope) -> None:
-        if self.service.observe is not None:
-            self.service.observe(envelope)
 
     def handle(self, envelope: Envelope) -> None:
         """For the clock: let the service handle an envelope; an observer gets one that does not count, too."""

@@ -12,7 +12,6 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from services.base.evaluator import UnjudgeableError
 from services.base.lockstep_clock import EPOCH, Observer
 from services.base.recorded_clock import RecordingClock, read_steps
-from tests.services.base.lockstep.test_observer import Seen
 
 STEP = 100_000
 MESSAGES = MessageSet.standard()
@@ -29,16 +28,6 @@ def write(path: Path, envelopes: Iterable[Envelope]) -> Path:
     return path
 
 
-class Recorder(Seen):
-    """Everything that an observer sees, as a recorder takes it."""
-
-    def __init__(self) -> None:
-        self.envelopes: list[Envelope] = []
-
-    def observe(self, envelope: Envelope) -> None:
-        self.envelopes.append(envelope)
-
-
 names = st.text("abc", max_size=2)
 relayed = st.lists(st.builds(sent, names, st.sampled_from((0, 0, 7))), max_size=5)
 raw = st.lists(st.builds(sent, names, st.integers(8, 9)), max_size=3)
@@ -49,23 +38,23 @@ raw = st.lists(st.builds(sent, names, st.integers(8, 9)), max_size=3)
 def test_steps_are_those_of_the_clock_whatever_was_on_the_bus(
     tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[list[Envelope], list[Envelope]]]
 ) -> None:
-    observer, recorder = Observer(MESSAGES), Recorder()
+    observer, seen = Observer(MESSAGES), list[Envelope]()
     for number, (messages, on_the_bus) in enumerate(steps):
         for envelope in on_the_bus:
             observer.collect(envelope)
-        observer.deliver(recorder, EPOCH + number * STEP, messages)
-    observer.flush(recorder)
-    path = write(tmp_path_factory.mktemp("steps") / "test.rec", [*recorder.envelopes, FORGED, END])
+        observer.deliver(seen.append, EPOCH + number * STEP, messages)
+    observer.flush(seen.append)
+    path = write(tmp_path_factory.mktemp("steps") / "test.rec", [*seen, FORGED, END])
     assert [(step.time, step.messages) for step in read_steps(path, MESSAGES)] == [
         (EPOCH + number * STEP, messages) for number, (messages, _) in enumerate(steps)
     ]
 
 
 def test_a_recording_with_a_hole_is_refused(tmp_path: Path) -> None:
-    observer, recorder = Observer(MESSAGES), Recorder()
+    observer, seen = Observer(MESSAGES), list[Envelope]()
     for number in range(5):
-        observer.deliver(recorder, EPOCH + number * STEP, [sent(str(number))])
-    path = write(tmp_path / "test.rec", [*recorder.envelopes[:2], *recorder.envelopes[8:]])
+        observer.deliver(seen.append, EPOCH + number * STEP, [sent(str(number))])
+    path = write(tmp_path / "test.rec", [*seen[:2], *seen[8:]])
     with pytest.raises(UnjudgeableError, match="lacks the steps 2 to 4: it was paused"):
         list(read_steps(path, MESSAGES))
 
@@ -73,10 +62,8 @@ def test_a_recording_with_a_hole_is_refused(tmp_path: Path) -> None:
 START = 1_750_000_000_000_000
 
 
-class Inbox(Seen):
+class Inbox:
     """What a service gets and when: a letter for a message, a number for an update, us from the start."""
-
-    observes = False
 
     def __init__(self, clock: RecordingClock) -> None:
         self.clock = clock
