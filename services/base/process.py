@@ -11,6 +11,8 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
+from google.protobuf.message import Message
+
 from dodo_dsl.opendlv import address_book
 from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.opendlv.message_set import MessageSet
@@ -31,8 +33,17 @@ def _log_end(error: Exception, *, expected: bool) -> None:
     """Logs the error; the last line is one sentence. ``expected`` means that its own text is one for users."""
     if not expected and not type(error).__module__.startswith(_OURS):
         logging.error("it ended by an error", exc_info=error)
-    text = " ".join(str(error).split())
+    text = _unknown_field(error) or " ".join(str(error).split())
     logging.critical("%s", text if expected else f"{type(error).__name__}: {text}")
+
+
+def _unknown_field(error: Exception) -> str:
+    """What is wrong where a message has no field of the name that was read; empty for anything else."""
+    if not isinstance(error, AttributeError) or not isinstance(error.obj, Message):
+        return ""
+    about = error.obj.DESCRIPTOR
+    fields = ", ".join(field.name for field in about.fields)
+    return f"{about.full_name} has no field '{error.name}'; it has {fields or 'no fields'}"
 
 
 DONE, BROKEN, USAGE = 0, 1, 2

@@ -1,5 +1,6 @@
 """The clock for a recording: its steps where it has them, else its messages by when they were received."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -22,22 +23,30 @@ if TYPE_CHECKING:
 
 
 class RecordedSteps(ClockClient):
-    """Gives a LockstepClock recorded steps."""
+    """Gives a LockstepClock recorded steps, without what the service sent itself and so did not hear."""
 
     def __init__(self, path: Path, messages: MessageSet) -> None:
         self._steps = read_steps(path, messages)
+        self._sent: Counter[Envelope] = Counter()
 
     def next(self, observe: Callable[[Envelope], None] | None) -> Step:
         """Raises EOFError behind the last one."""
         if (step := next(self._steps, None)) is None:
             raise EOFError
-        return step
+        return Step(step.time, [each for each in step.messages if not self._is_own(each)])
 
     def drain(self, observe: Callable[[Envelope], None]) -> bool:
         return False
 
     def answer(self, done: Done) -> None:
-        """Nobody waits for it."""
+        self._sent.update(each._replace(sent=0, received=0) for each in done.messages)
+
+    def _is_own(self, envelope: Envelope) -> bool:
+        key = envelope._replace(sent=0, received=0)
+        if not self._sent[key]:
+            return False
+        self._sent[key] -= 1
+        return True
 
     def close(self) -> None:
         """Nothing is open."""

@@ -1,5 +1,6 @@
 """The output of a command replaces regular files only, whoever made what is in its place."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -47,3 +48,20 @@ def test_compiling_follows_no_symlink(tmp_path: Path, monkeypatch: pytest.Monkey
         assert dodo("compile", "sil-closed-straight")[0] == 0
         assert place.is_dir() and not place.is_symlink(), "the whole folder is another one"
     assert [path.name for path in (tmp_path / "theirs").iterdir()] == ["precious"]
+
+
+@pytest.mark.parametrize("parameter", ["rec", "snapshot"])
+@pytest.mark.parametrize(
+    "name",
+    ["/root/.ssh/authorized_keys", "../a.rec", "/etc/cron.d/a", "/tmp/../etc/a", "a/b", ".bashrc", "", "/dev/null"],
+)
+def test_a_spec_names_no_output_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parameter: str, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [.]\n")
+    values = {"rec": "a.rec", "memories": ["a"], parameter: name}
+    use = {"uses": "rec-recorder", "with": values}
+    (tmp_path / "a.dodo.yml").write_text(f"dodo: 1\nname: a\nenvironment: {json.dumps({'more': use})}\n")
+    _, output = dodo("compile", "--check")
+    assert f"error[path-escape]: parameter '{parameter}' is '{name}', expected a file's name without" in output, output

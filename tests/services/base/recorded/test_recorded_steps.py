@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dodo_dsl.opendlv.channel import Done, Step
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from services.base.evaluator import UnjudgeableError
 from services.base.lockstep_clock import EPOCH, Observer
-from services.base.recorded_clock import RecordingClock, read_steps
+from services.base.recorded_clock import RecordedSteps, RecordingClock, read_steps
 
 STEP = 100_000
 MESSAGES = MessageSet.standard()
@@ -57,6 +58,18 @@ def test_a_recording_with_a_hole_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "test.rec", [*seen[:2], *seen[8:]])
     with pytest.raises(UnjudgeableError, match="lacks the steps 2 to 4: it was paused"):
         list(read_steps(path, MESSAGES))
+
+
+def test_a_service_does_not_hear_itself(tmp_path: Path) -> None:
+    observer, seen, own = Observer(MESSAGES), list[Envelope](), sent("own")
+    observer.deliver(seen.append, EPOCH, [sent("a")])
+    observer.deliver(seen.append, EPOCH + STEP, [own, sent("b"), own])
+    source = RecordedSteps(write(tmp_path / "test.rec", seen), MESSAGES)
+    assert source.next(None) == Step(EPOCH, [sent("a")])
+    source.answer(Done("judge", [own._replace(sent=77)]))
+    assert source.next(None) == Step(EPOCH + STEP, [sent("b"), own])
+    with pytest.raises(EOFError):
+        source.next(None)
 
 
 START = 1_750_000_000_000_000
