@@ -50,12 +50,8 @@ _FOR_TERMINALS = re.compile(
 """Control sequences of ECMA-48."""
 
 
-class NoValue(ValueError):
-    """A printed text does not fit its field; the message says why."""
-
-
 def value(type_: str, text: bytes) -> Any:
-    """The value of a field of a type of messages; raises NoValue."""
+    """The value of a field of a type of messages; raises ValueError, which says why there is none."""
     try:
         if type_ in ("float", "double") and _NUMBER.fullmatch(text):
             struct.pack("<f" if type_ == "float" else "<d", found := float(text))
@@ -72,16 +68,16 @@ def value(type_: str, text: bytes) -> Any:
             return text.decode() if type_ == "string" else text
     except (OverflowError, KeyError, ValueError):  # UnicodeDecodeError is a ValueError, too
         pass
-    raise NoValue(f"not a valid {type_}")
+    raise ValueError(f"not a valid {type_}")
 
 
 def sample_time(unit: str, text: bytes) -> int:
-    """A time in microseconds, to which decimals of ``s`` and ``ms`` are rounded; raises NoValue."""
+    """A time in microseconds, to which decimals of ``s`` and ``ms`` are rounded; raises ValueError."""
     if not _TIME.fullmatch(text) or (unit == "us" and b"." in text):
-        raise NoValue("no whole number (of us, without sample-time: s)" if unit == "us" else "no number")
+        raise ValueError("no whole number (of us, without sample-time: s)" if unit == "us" else "no number")
     found = round(Fraction(text.decode()) * _UNITS[unit])
     if found >= _END_OF_TIME:
-        raise NoValue(f"not a time in {unit}")
+        raise ValueError(f"not a time in {unit}")
     return found
 
 
@@ -106,7 +102,7 @@ class LinePattern:
         self._groups = [(name, number, types.get(name, "uint64")) for name, number in groups.items()]
 
     def printed(self, line: bytes) -> Printed | None:
-        """The message of a line, None if the pattern is not in it; raises NoValue."""
+        """The message of a line, None if the pattern is not in it; raises ValueError."""
         match = self._regexp.search(line)
         if match is None:
             return None
@@ -118,13 +114,13 @@ class LinePattern:
             try:
                 own = name == SAMPLE_TIME
                 values[name] = sample_time(self.line.sample_time, text) if own else value(type_, text)
-            except NoValue as error:
-                raise NoValue(f"{name} '{_shown(text)}' is {error}") from None
+            except ValueError as error:
+                raise ValueError(f"{name} '{_shown(text)}' is {error}") from None
         sampled = values.pop(SAMPLE_TIME, None)
         message = self._type(**values)
         payload = self._messages.encode(message)
         if len(payload) > MAX_PAYLOAD:
-            raise NoValue(f"it has more than {MAX_PAYLOAD} bytes")
+            raise ValueError(f"it has more than {MAX_PAYLOAD} bytes")
         return Printed(self.line, self._messages.id(message), payload, sampled)
 
 
@@ -154,7 +150,7 @@ class ServiceLines:
         for pattern in self.patterns:
             try:
                 printed = pattern.printed(line)
-            except NoValue as error:
+            except ValueError as error:
                 what = f"is not a valid {pattern.line.message}"
                 key = f"{what} {str(error).partition(' ')[0]}"
                 self.notes.setdefault(key, f"a line of '{self.service}' {what}: {error}: '{_shown(line)}'")

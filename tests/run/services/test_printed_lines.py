@@ -12,7 +12,7 @@ from dodo_dsl.application.printed_lines import PatternError, compiled
 from dodo_dsl.opendlv.envelope import Envelope, decode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.plan.model import Line
-from dodo_dsl.run.printed_lines import NoValue, PrintedLines, sample_time, value
+from dodo_dsl.run.printed_lines import PrintedLines, sample_time, value
 from tests.run.helpers import Bench
 
 STEERING = "opendlv.proxy.GroundSteeringRequest"
@@ -131,7 +131,7 @@ def test_lines_for_a_terminal_are_the_messages_of_plain_ones(desk: Desk) -> None
 def test_values_of_fields(type_: str, text: bytes, expected: object) -> None:
     try:
         found = value(type_, text)
-    except NoValue as error:
+    except ValueError as error:
         found = str(error)
     assert (type(found), found) == (type(expected), expected)
 
@@ -150,7 +150,7 @@ def test_values_of_fields(type_: str, text: bytes, expected: object) -> None:
 def test_sample_times_are_exact_in_their_unit(unit: str, text: bytes, expected: object) -> None:
     try:
         found: object = sample_time(unit, text)
-    except NoValue as error:
+    except ValueError as error:
         found = str(error)
     assert found == expected
 
