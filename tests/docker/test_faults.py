@@ -1,20 +1,14 @@
-"""Faults around runs with containers: of registry, disk, engine and runner."""
+"""Faults around runs with containers: of disk, engine and runner."""
 
-import contextlib
 import re
-import secrets
 import signal
 import socket
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from dodo_dsl.run import capabilities, leases, work_folder
-from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, reap_projects
-from dodo_dsl.run.docker.client import connect
+from dodo_dsl.run import capabilities, work_folder
 from tests.docker.compose import IMAGE, Crate
 from tests.docker.engine_proxy import EngineProxy, engine_socket
 from tests.faults import Book
@@ -107,39 +101,3 @@ def test_kept_project_stays_until_it_is_taken_down(crate: Crate) -> None:
     assert not any(crate.mark in name for name in crate.left())
     work_folder.reap_folders()  # with the record of the run
     capabilities.clean()
-
-
-@pytest.fixture
-def client(base_image: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
-    with contextlib.closing(connect()) as made:
-        yield made
-
-
-def leftover(client: Any, test: str) -> tuple[Any, Any]:
-    """Network and volume of a killed run's project, with the record of its lease."""
-    project = f"dodo-{test}-{secrets.token_hex(3)}"
-    lease = leases.try_lease(f"{leases.PROJECT}{project}", {"test": test})
-    assert lease is not None
-    lease.leave()
-    labels = {PROJECT_LABEL: project}
-    return client.networks.create(project, labels=labels), client.volumes.create(project, labels=labels)
-
-
-def test_a_strangers_container_on_a_leftover_network_blocks_nothing_else(client: Any, base_image: str) -> None:
-    blocked, volume = leftover(client, "a-blocked")
-    free, free_volume = leftover(client, "b-free")
-    stranger = client.containers.run(base_image, ["sleep", "600"], detach=True, network=blocked.name, init=True)
-    try:
-        removed, left = reap_projects(client)
-        names = {n.name for n in client.networks.list()} | {v.name for v in client.volumes.list()}
-        assert names & {blocked.name, volume.name, free.name, free_volume.name} == {blocked.name}
-        assert removed == ["b-free: 2 containers, networks and volumes"]
-        assert left[0].startswith(f"a-blocked: project {blocked.name}: ") and "has active endpoints" in left[0]
-        assert capabilities.clean()[1] == left, "it is tried again, and said again"
-        stranger.reload()
-        assert stranger.status == "running"
-    finally:
-        stranger.remove(force=True)
-    assert capabilities.clean()[0] == ["a-blocked: 1 containers, networks and volumes"]
-    assert list(leases.lease_folder().glob("*.lease")) == []

@@ -1,11 +1,13 @@
 """Projects are removed from an engine that may still be busy with what has ended."""
 
 import contextlib
+from pathlib import Path
 from typing import Any
 
 import pytest
 from docker.errors import APIError, NotFound
 
+from dodo_dsl.run import leases
 from dodo_dsl.run.docker import cleanup
 
 
@@ -69,3 +71,17 @@ def test_what_cannot_be_removed_at_once(
     with contextlib.nullcontext() if isinstance(expected, int) else pytest.raises(expected):
         assert cleanup.remove_project(Engine(*errors), "dodo-x", **more) == expected
     assert rests == waited
+
+
+def test_what_a_killed_run_left_stays_on_record_until_it_is_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path))
+    for test in "ab":
+        lease = leases.try_lease(f"{leases.PROJECT}dodo-{test}", {"test": test})
+        assert lease is not None
+        lease.leave()
+    engine = Engine(BUSY)
+    blocked = "a: project dodo-a: network has active endpoints"
+    assert cleanup.reap_projects(engine) == (["b: 1 containers, networks and volumes"], [blocked])
+    assert [lease.name for lease in leases.orphans(leases.PROJECT)] == [f"{leases.PROJECT}dodo-a"]
