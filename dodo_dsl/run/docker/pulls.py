@@ -25,8 +25,8 @@ class Pulls:
 
     async def provide(self, plan: Plan, own: Iterable[str], application: Iterable[str], say: Say) -> list[str]:
         """Makes a test's images local; returns notes on those that could not be updated. Raises BackendError."""
-        waits = [self.once(image, partial(self._own, image, plan, say)) for image in sorted(set(own))]
-        waits += [self.once(image, partial(self._pull, image, plan, say)) for image in sorted(set(application))]
+        images = dict.fromkeys(application, False) | dict.fromkeys(own, True)
+        waits = (self.once(name, partial(self._pull, name, images[name], plan, say)) for name in sorted(images))
         return [note for note in await asyncio.gather(*waits) if note]
 
     async def once(self, key: str, work: Callable[[], Coroutine[Any, Any, str | None]]) -> str | None:
@@ -41,10 +41,9 @@ class Pulls:
         if task.cancelled() or task.exception() is not None:
             del self._tasks[key]
 
-    async def _own(self, image: str, plan: Plan, say: Say) -> str:
-        return "" if await asyncio.to_thread(self._has, image) else await self._pull(image, plan, say)
-
-    async def _pull(self, image: str, plan: Plan, say: Say) -> str:
+    async def _pull(self, image: str, is_own: bool, plan: Plan, say: Say) -> str:
+        if is_own and await asyncio.to_thread(self._has, image):
+            return ""
         say(f"pulling {image}")
         code, text = await run(["pull", "--quiet", image], Path("/"), secret_variables.of_client(os.environ))
         if not code:
