@@ -1,9 +1,17 @@
 """One who looks at everything sees each message of a lockstep test once, in the step that it belongs to."""
 
+from contextlib import ExitStack, closing
+from pathlib import Path
+
 import pytest
 
+from dodo_dsl.opendlv import address_book
+from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.packets import Listener
+from dodo_dsl.opendlv.session import Session
+from services.base.clock_link import ClockClient
 from services.base.lockstep_clock import EPOCH, Observer
 
 STEP = 100_000
@@ -61,3 +69,21 @@ def test_the_last_answer_is_seen_at_the_end_of_the_test() -> None:
     for _ in range(2):
         observer.flush(seen.append)
     assert [each.payload for each in seen if each.data_type != MARK] == [b"own", b"answer"]
+
+
+def test_what_services_send_is_not_taken_from_the_bus(
+    cid: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It comes with the steps; what the runner sends for the application does not."""
+    monkeypatch.setenv(CHANNEL_VARIABLE, str(tmp_path))
+    with ExitStack() as stack:
+        stack.enter_context(closing(Listener(tmp_path / ".clock", ("recorder",))))
+        own, pose, application, runner = (stack.enter_context(Session(cid)) for _ in range(4))
+        client = stack.enter_context(closing(ClockClient(own, "recorder")))
+        for name, session in (("pose", pose), ("dodo-runner", runner)):
+            address_book.enter(tmp_path, name, session.address)
+        for payload, session in ((b"pose", pose), (b"application", application), (b"runner", runner)):
+            session.send_envelope(sent(payload, EPOCH))
+        seen: list[Envelope] = []
+        assert client.drain(seen.append) and not client.drain(seen.append)
+    assert [each.payload for each in seen] == [b"application", b"runner"]
