@@ -90,8 +90,9 @@ def _build(sources: Path, folder: Path) -> None:
     except (OSError, subprocess.SubprocessError) as error:
         for name in (LIBRARY, AGENT):
             (folder / name).unlink(missing_ok=True)
-        said = (getattr(error, "stderr", "") or str(error)).strip().splitlines()
-        raise BackendError(f"DoDo's library cannot be built: {said[0]}") from None
+        said = error.stderr.split("\n") if isinstance(error, subprocess.CalledProcessError) else []
+        why = next((line.strip() for line in said if line.strip()), str(error))
+        raise BackendError(f"DoDo's library cannot be built: {why}") from None
 
 
 _INTERPRETER, _NOTE = 3, 4

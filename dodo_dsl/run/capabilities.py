@@ -19,8 +19,6 @@ from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.rigs.leases import all_quarantined
 from dodo_dsl.run.rigs.problems import RigProblem
 
-State = Literal["ok", "warning", "problem"]
-
 
 @dataclass(frozen=True)
 class Capability:

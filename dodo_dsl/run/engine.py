@@ -108,12 +108,15 @@ class Engine:
 
     async def _wind_up(self, keep: bool) -> list[str]:
         await self._measure()
-        if self.state.finding.silent and not self.backend.is_on_host:
-            await self._look_for_buses()
-        if not keep and self.state.outcome(self.backend).outcome == "passed":
-            self.passed()
-        self.say("taking down")
-        return await self.backend.close(keep)
+        try:
+            if self.state.finding.silent and not self.backend.is_on_host:
+                await self._look_for_buses()
+            if not keep and self.state.outcome(self.backend).outcome == "passed":
+                self.passed()
+        finally:
+            self.say("taking down")
+            kept = await self.backend.close(keep)
+        return kept
 
     async def _collect_losses(self) -> None:
         """Losses, lateness, notes, ends and the clock's time as reported in teardown; other events do not count then.

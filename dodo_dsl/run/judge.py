@@ -1,7 +1,9 @@
 """The evaluators of a test, as processes, on the recording of a test."""
 
 import subprocess
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,10 +40,11 @@ def judge(plan: Plan, folder: Path, recording: TestRecording, cid: int, work: Pa
     verdicts: dict[str, list[VerdictEvent]] = {service.name: [] for service in services}
     findings: list[Finding] = []
     notes: list[str] = []
-    with ThreadPoolExecutor() as pool:
-        ended = dict(zip(verdicts, pool.map(lambda s: _run(commands.of(s), recording), services), strict=True))
-    for name, process in ended.items():
-        for line in process.stdout.splitlines():
+    with ThreadPoolExecutor(len(services)) as pool, ExitStack() as stack:
+        running = [stack.enter_context(_started(commands.of(service), recording)) for service in services]
+        said = dict(zip(verdicts, pool.map(lambda process: process.communicate(), running), strict=True))
+    for (name, (output, _)), process in zip(said.items(), running, strict=True):
+        for line in output.splitlines():
             match service_protocol.read(name, True, line):
                 case VerdictEvent() as verdict:
                     verdicts[name].append(verdict)
@@ -56,15 +59,27 @@ def judge(plan: Plan, folder: Path, recording: TestRecording, cid: int, work: Pa
             findings.append(Finding("error", text, name))
     finding = decide(plan, findings, verdicts)
     last: list[str] = []
-    if finding.result != "passed" and finding.service in ended:
-        last = ended[finding.service].stderr.decode("utf-8", "replace").splitlines()[-TAIL_LINES:]
+    if finding.result != "passed" and finding.service in said:
+        last = said[finding.service][1].decode("utf-8", "replace").splitlines()[-TAIL_LINES:]
     last_lines = tuple(line[:TAIL_WIDTH] for line in last if line.strip())
     return Judgement(finding, tuple(v for each in verdicts.values() for v in each), tuple(notes), last_lines)
 
 
-def _run(command: Command, recording: TestRecording) -> "subprocess.CompletedProcess[bytes]":
+@contextmanager
+def _started(command: Command, recording: TestRecording) -> Iterator["subprocess.Popen[bytes]"]:
+    """An evaluator, which is killed at the end if it still runs."""
     kept = {name: value for name, value in command.environment.items() if name not in NOT_OF_A_RECORDING}
     environment = {**kept, "DODO_CLOCK": "recording", "DODO_RECORDING": str(recording.path.resolve())}
-    return subprocess.run(
-        command.argv, env=environment, cwd=command.folder, stdin=subprocess.DEVNULL, capture_output=True, check=False
+    process = subprocess.Popen(
+        command.argv,
+        env=environment,
+        cwd=command.folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
     )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()

@@ -165,6 +165,8 @@ def orphans(prefix: str) -> Iterator[Lease]:
     """This user's leases whose holders have ended and may have left something; each is yielded held."""
     for path in sorted(lease_folder().glob(f"{prefix}*{_ENDING}")):
         with contextlib.suppress(OSError):
-            own = path.lstat().st_uid == os.getuid()
-            if own and (descriptor := _locked(path, fcntl.LOCK_EX, is_made=False)) is not None:
+            descriptor = _locked(path, fcntl.LOCK_EX, is_made=False)
+            if descriptor is not None and os.fstat(descriptor).st_uid == os.getuid():
                 yield Lease(path.name.removesuffix(_ENDING), descriptor, path, _said(descriptor))
+            elif descriptor is not None:
+                os.close(descriptor)

@@ -123,6 +123,17 @@ def _may_send(service: PlannedService, message: str) -> bool:
     return any(port.rstrip("?").partition("/")[0] in (message, ANYTHING) for port in ports)
 
 
+def lost_messages(service: PlannedService, messages: int) -> str:
+    """A sentence on a service whose receive buffer was full, and on what that means."""
+    meaning = "it worked without them"
+    if any(flag.kind == "report" for flag in service.flags):
+        meaning = "the recording is incomplete"
+    elif service.judge:
+        meaning = "its verdict does not consider them"
+    count = f"{messages} message{'s' * (messages != 1)}"
+    return f"service '{service.name}' lost {count}, because its receive buffer was full: {meaning}"
+
+
 def how_it_ended(code: int) -> str:
     """An exit code in words; negative codes and those above 128 are signals."""
     number = -code if code < 0 else code - 128

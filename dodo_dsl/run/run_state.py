@@ -11,7 +11,7 @@ from dodo_dsl.plan.added_services import CLOCK, RECORDER, TIME
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import start_order
 from dodo_dsl.run.machine_load.judgement import JudgedFigures, consider
-from dodo_dsl.run.outcomes import decide, flooded, how_it_ended, outcome_of
+from dodo_dsl.run.outcomes import decide, flooded, how_it_ended, lost_messages, outcome_of
 from dodo_dsl.run.protocol import (
     Cause,
     Event,
@@ -248,8 +248,7 @@ class RunState:
         found = self._timed(considered)
         graph = [] if found.result == "passed" else self.graph[:_MOST_OF_GRAPH]
         finding = replace(found, reason="; ".join([*graph, found.reason, *self._details(found, backend.cid)]))
-        full = "because its receive buffer was full"
-        losses = (f"service '{name}' lost {count} messages, {full}" for name, count in sorted(self.lost.items()))
+        losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(
             outcome_of(plan, finding, backend.name, backend.cid),
             setup_s=self.setup_s,

@@ -100,18 +100,23 @@ class Runner:
         was too busy. What was before stays in the report.
         """
         notes: tuple[str, ...] = ()
-        outcome, cores = None, self.schedule.need(job)
+        outcome: Outcome | None = None
+        cores = self.schedule.need(job)
         for number in itertools.count(1):
-            latest = await self._turn(job, cores)
-            if latest is None:
+            try:
+                async with self.schedule.take(cores):
+                    if self._stop or self.interrupted:
+                        break
+                    if outcome and (problem := _set_aside(job, number - 1)):
+                        outcome = replace(outcome, notes=(*outcome.notes, f"not tried again, {problem}"))
+                        break
+                    latest = await self._attempt(job)
+            except asyncio.CancelledError:
                 break
             outcome = replace(latest, notes=(*notes, *latest.notes))
             is_undecided = outcome.machine is not None and outcome.machine.undecided
             most = max(self.retries, is_undecided)
             if outcome.outcome != "error" or number > most or self.interrupted or self.keep:
-                break
-            if problem := _set_aside(job, number):
-                outcome = replace(outcome, notes=(*outcome.notes, f"not tried again, {problem}"))
                 break
             notes = (*outcome.notes, f"attempt {number} ended in error: {outcome.reason}")
             self.progress.phase(job.plan.slug, f"waiting to be tried again alone, after error: {outcome.reason}")
@@ -125,14 +130,6 @@ class Runner:
         if self._finished:
             self._finished(job, outcome)
         return outcome
-
-    async def _turn(self, job: Job, cores: int) -> Outcome | None:
-        """The outcome of an attempt with some cores, in its turn; None when no further one was to begin."""
-        try:
-            async with self.schedule.take(cores):
-                return None if self._stop or self.interrupted else await self._attempt(job)
-        except asyncio.CancelledError:
-            return None
 
     async def _attempt(self, job: Job) -> Outcome:
         outcome = None

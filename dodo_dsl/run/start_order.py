@@ -44,7 +44,7 @@ class Conditions:
         ``note`` gets a sentence for each optional service without which it starts.
         """
         for other, asked in self.of(name).items():
-            why = await self._known_of(other, STARTED) or await self.why_not(other, asked)
+            why = await self.why_not(other, STARTED) or await self.why_not(other, asked)
             told = f"it waits for '{other}' to {_ASKED[asked]} (depends_on), which {why}"
             if why and other not in self._optional[name]:
                 return told

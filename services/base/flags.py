@@ -38,7 +38,8 @@ _LIMITS = {"minimum": "at least", "maximum": "at most", "multiple-of": "a multip
 def facts(about: About) -> str:
     """What a parameter takes: ``number in Hz, at least 1, at most 1000``; shares, whose unit is 1, have none."""
     unit = "" if about.get("unit") in (None, "", "1") else f" in {about['unit']}"
-    kind = about["type"].replace("amount", "number or share" if about.get("or-share") else "number")
+    kinds = {"amount": "number or share" if about.get("or-share") else "number", "boolean": "true or false"}
+    kind = kinds.get(about["type"]) or about["type"]
     choices = [f"one of {', '.join(about['choices'])}"] if about.get("choices") else []
     return ", ".join(
         [kind + unit, *(f"{word} {about[key]}" for key, word in _LIMITS.items() if key in about), *choices]

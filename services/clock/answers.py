@@ -10,7 +10,7 @@ from dodo_dsl.opendlv.channel import Done, Show
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from services.clock import exchange
-from services.clock.exchange import ApplicationFails, Exchange
+from services.clock.exchange import ApplicationFails, ApplicationFloods, Exchange
 
 MOST_SURPLUS = 100
 """Surplus messages of one kind to a frame; more of them are a flood that would keep others from the bus."""
@@ -146,7 +146,7 @@ class AnsweringApplication:
         if self._surplus[each.name] > MOST_SURPLUS:
             message = each.name.rpartition(".")[2]
             sent = f"sent more than {MOST_SURPLUS} {message}s that nobody asked for"
-            raise ApplicationFails(f"the application {sent} within a frame: it floods the bus")
+            raise ApplicationFloods(f"the application {sent} within a frame: it floods the bus")
 
     def await_answer(self, until: int) -> None:
         """Wait for the answer to what was shown; raises TestEnded."""

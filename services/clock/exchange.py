@@ -40,6 +40,10 @@ class ApplicationFails(TestEnded):
     kind = "unanswered"
 
 
+class ApplicationFloods(ApplicationFails):
+    """It counts also where the test is over."""
+
+
 class ServiceSilent(TestEnded):
     kind = "stuck"
 
@@ -83,16 +87,16 @@ class Exchange:
         if service in self._channels:
             self._channels[service].send(command)
 
-    def results(self, services: Iterable[str]) -> list[Done]:
+    def results(self, services: Iterable[str], patience: float = SERVICE_PATIENCE) -> list[Done]:
         """The answers of services, fewer where the test is over; raises ServiceSilent."""
         found: list[Done] = []
-        end = time.monotonic() + SERVICE_PATIENCE
+        end = time.monotonic() + patience
         for name in services:
             while (done := self.result(name, SLICE_S)) is None:
                 if self.stopped():
                     return found
                 if time.monotonic() > end:
-                    raise ServiceSilent(f"service '{name}' did not answer the clock within {SERVICE_PATIENCE:g} s")
+                    raise ServiceSilent(f"service '{name}' did not answer the clock within {patience:g} s")
             found.append(done)
         return found
 

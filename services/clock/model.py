@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 from dodo_dsl.opendlv.channel import Done, Step
 from dodo_dsl.opendlv.envelope import Envelope
 from services.base.lockstep_clock import EPOCH
-from services.clock.exchange import ApplicationFails, Exchange, Roles, TimeOver
+from services.clock.exchange import (
+    SERVICE_PATIENCE,
+    START_PATIENCE,
+    ApplicationFails,
+    ApplicationFloods,
+    Exchange,
+    Roles,
+    TimeOver,
+)
 
 if TYPE_CHECKING:
     from services.clock.answers import AnsweringApplication
@@ -82,8 +90,8 @@ class Stepper:
         """Wait for the answer; a missing one does not matter when the test is over. Raises TestEnded."""
         try:
             self.application.await_answer(round(self._following()))
-        except ApplicationFails:
-            if not self._is_over():
+        except ApplicationFails as problem:
+            if isinstance(problem, ApplicationFloods) or not self._is_over():
                 raise
             return False
         return True
@@ -110,7 +118,7 @@ class Stepper:
             self.link.send(name, Step(until, messages))
 
     def _await(self, names: Sequence[str]) -> list[Done]:
-        results = self.link.results(names)
+        results = self.link.results(names, SERVICE_PATIENCE if self._next else START_PATIENCE)
         for result in results:
             self._take(result)
         return results

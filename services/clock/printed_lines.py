@@ -6,7 +6,7 @@ from typing import Any
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from services.base.runner import tell
-from services.clock.exchange import SLICE_S, ApplicationFails, Exchange, ServiceSilent
+from services.clock.exchange import SLICE_S, ApplicationFloods, Exchange, ServiceSilent
 
 PATIENCE_S = 240.0
 """Wall time in s for the runner to read and match what is printed, which has its own limit."""
@@ -36,7 +36,7 @@ class PrintedLines:
         """
         self._turns = self._turns + 1 if self._goes_on else 0
         if self._turns > MOST_TURNS:
-            raise ApplicationFails("the application prints on and on within a step: it floods its output")
+            raise ApplicationFloods("the application prints on and on within a step: it floods its output")
         self._read, end = None, time.monotonic() + PATIENCE_S
         tell("rest", time=now)
         while self._read is None or self._read.sample_time != now:

@@ -17,7 +17,7 @@ from services.base.runner import tell
 from services.clock import exchange
 from services.clock.agent import Busy, Report, TimeAgent
 from services.clock.answers import MessageFilter
-from services.clock.exchange import SLICE_S, WALL_FACTOR, ApplicationFails, Exchange, ServiceSilent
+from services.clock.exchange import SLICE_S, WALL_FACTOR, ApplicationFails, ApplicationFloods, Exchange, ServiceSilent
 from services.clock.printed_lines import PrintedLines
 
 MOST_SENT = 1000
@@ -75,8 +75,10 @@ def processor_name() -> str:
         text = Path("/proc/cpuinfo").read_text(errors="replace")
     except OSError:
         return ""
-    found = re.search(r"^(?:model name|Model|Hardware)\s*:\s*(.+)$", text, re.MULTILINE)
-    return found[1] if found else ""
+    found = (
+        re.search(rf"^{key}[ \t]*:[ \t]*(\S.*)$", text, re.MULTILINE) for key in ("model name", "Model", "Hardware")
+    )
+    return next((each[1] for each in found if each), "")
 
 
 @dataclass
@@ -164,7 +166,7 @@ class RestingApplication:
         self._counts[envelope.data_type] += 1
         if self._counts[envelope.data_type] > MOST_SENT:
             message = name.partition("/")[0].rpartition(".")[2]
-            raise ApplicationFails(
+            raise ApplicationFloods(
                 f"the application sent more than {MOST_SENT} {message}s within a step: it floods the bus"
             )
         self._sent.append(envelope)

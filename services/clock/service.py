@@ -16,7 +16,7 @@ from services.base.members import SenderTable
 from services.base.runner import tell
 from services.clock.agent import TimeAgent
 from services.clock.answers import AnsweringApplication, filters
-from services.clock.exchange import SLICE_S, Exchange, Roles, TestEnded
+from services.clock.exchange import SLICE_S, Exchange, Roles, ServiceSilent, TestEnded
 from services.clock.model import Stepper
 from services.clock.printed_lines import PrintedLines
 from services.clock.resting import ResponseTimes, RestingApplication
@@ -57,7 +57,8 @@ class ClockService(Service):
             return answering
         agent = TimeAgent(Path(flags["time-folder"]))
         context.resources.callback(agent.close)
-        agent.open()  # before an application could find it
+        with suppress(ServiceSilent):  # the first step says so; it is opened before an application could find it
+            agent.open()
         response, names = ResponseTimes(1 / flags["freq"], flags["max-response"]), flags["application"]
         return RestingApplication(self._exchange, answering.filters, agent, response, names, self._lines)
 

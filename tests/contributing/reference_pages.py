@@ -66,7 +66,7 @@ SETTINGS = {
     "DOCKER_HOST": "the Docker engine, with `DOCKER_TLS_VERIFY` and `DOCKER_CERT_PATH` as for docker itself",
     "FORCE_COLOR": "`1` switches colours on, as in a CI log",
     "NO_COLOR": "`1` switches colours off",
-    "XDG_CACHE_HOME": "where DoDo keeps wheels and small programs; default `~/.cache`",
+    "XDG_CACHE_HOME": "where DoDo keeps wheels, compiled templates and small programs; default `~/.cache`",
     "XDG_STATE_HOME": "where DoDo keeps durations and quarantines; default `~/.local/state`",
 }
 PIPELINES = {

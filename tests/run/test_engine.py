@@ -318,8 +318,8 @@ def test_losses_and_notes_count_until_teardown_has_ended_and_nothing_else_does()
         "passed",
         (
             "a file is missing",
-            "service 'camera' lost 30 messages, because its receive buffer was full",
-            "service 'track' lost 1 messages, because its receive buffer was full",
+            "service 'camera' lost 30 messages, because its receive buffer was full: it worked without them",
+            "service 'track' lost 1 message, because its receive buffer was full: its verdict does not consider them",
         ),
     )
 

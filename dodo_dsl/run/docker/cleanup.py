@@ -40,8 +40,8 @@ def remove_project(client: Any, project: str, rests_s: Sequence[float] = _RESTS_
     for rest_s in (0.0, *rests_s):
         time.sleep(rest_s)
         removals = [partial(c.remove, force=True, v=True) for c in client.containers.list(all=True, filters=filters)]
-        for kind in (client.networks, client.volumes):  # which no container may use any more
-            removals += [each.remove for each in kind.list(filters=filters)]
+        removals += [partial(_remove_network, network) for network in client.networks.list(filters=filters)]
+        removals += [volume.remove for volume in client.volumes.list(filters=filters)]
         problem = None
         for remove in removals:
             try:
@@ -55,6 +55,15 @@ def remove_project(client: Any, project: str, rests_s: Sequence[float] = _RESTS_
             return removed
     assert problem is not None
     raise problem
+
+
+def _remove_network(network: Any) -> None:
+    """Removes a network, also where an endpoint is left of a container that is gone, or never started."""
+    network.reload()
+    for key, about in (network.attrs.get("Containers") or {}).items():
+        if key.startswith("ep-"):
+            network.disconnect(about["Name"], force=True)
+    network.remove()
 
 
 def reap_projects(client: Any) -> tuple[list[str], list[str]]:

@@ -40,7 +40,7 @@ def end_slot(slot: str) -> int:
     for number, patience_s in ((signal.SIGTERM, _END_S), (signal.SIGKILL, _KILL_S)):
         deadline = time.monotonic() + patience_s
         for pid in running:
-            with contextlib.suppress(ProcessLookupError):
+            with contextlib.suppress(OSError):
                 os.kill(pid, number)
         while (running := _of_slot(slot)) and time.monotonic() < deadline:
             time.sleep(_POLL_S)

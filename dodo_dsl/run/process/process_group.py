@@ -64,7 +64,8 @@ def make(limit: int) -> ProcessGroup | None:
         return ProcessGroup(folders, limit + OURS)
     except OSError:
         for folder in folders:
-            folder.rmdir()
+            with contextlib.suppress(OSError):
+                folder.rmdir()
         return None
 
 

@@ -276,6 +276,8 @@ class ProcessSide:
         try:
             output = self._output(command)
         except OSError as error:
+            if error.filename or not self._watched.prints(command.name):
+                raise
             self._watched.not_started(command.name, f"no pseudo terminal is available: {error.strerror}")
             return
         with in_memory(json.dumps(asdict(command)).encode()) as file:  # which may be longer than a message

@@ -16,6 +16,14 @@ class Thing:
 
     def __init__(self, engine: "Engine", *errors: Exception) -> None:
         self._engine, self._errors = engine, list(errors)
+        self.endpoints: dict[str, dict[str, str]] = {}
+
+    def reload(self) -> None:
+        self.attrs = {"Containers": self.endpoints}
+
+    def disconnect(self, name: str, force: bool) -> None:
+        assert force
+        self.endpoints = {key: about for key, about in self.endpoints.items() if about["Name"] != name}
 
     def remove(self, **_: object) -> None:
         if self._errors:
@@ -85,3 +93,11 @@ def test_what_a_killed_run_left_stays_on_record_until_it_is_removed(
     blocked = "a: project dodo-a: network has active endpoints"
     assert cleanup.reap_projects(engine) == (["b: 1 containers, networks and volumes"], [blocked])
     assert [lease.name for lease in leases.orphans(leases.PROJECT)] == [f"{leases.PROJECT}dodo-a"]
+
+
+def test_endpoints_of_containers_that_could_not_start_are_removed() -> None:
+    engine = Engine()
+    network = engine.things[0]
+    network.endpoints = {"ep-1": {"Name": "dodo-x-driver-1"}}
+    assert cleanup.remove_project(engine, "dodo-x") == 1
+    assert (engine.things, network.endpoints) == ([], {})

@@ -104,3 +104,27 @@ def test_application_without_flags_runs_alone_on_the_host(host: Bench) -> None:
     spans = sorted(tuple(map(float, p.read_text().split())) for p in host.folder.glob("*.span"))
     assert len(spans) == 2
     assert spans[0][1] <= spans[1][0]
+
+
+IS_THERE = """
+def is_there(name):
+    try:
+        return open(name).read() == "there"
+    except OSError:
+        return False
+"""
+
+
+def test_what_is_hidden_in_the_applications_folder_is_absent(tmp_path: Path) -> None:
+    """But what dodo.yml names."""
+    bench = Bench(tmp_path, "network")
+    names = ("truths/a.csv", "truths/own.txt", "data/own.rec", "kept/a.rec")
+    for name in names:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("there")
+    look = f"{IS_THERE}os.chdir({str(tmp_path)!r})\nprint([n for n in {names} if is_there(n)])"
+    plan = bench.plan(application=look + "\nsys.exit(7)", judge=READY + WAIT)
+    limits = replace(plan.application.limits, reads=("data/own.rec",))
+    application = replace(plan.application, hidden=("truths/a.csv", "data", "kept"), limits=limits)
+    bench.run(plan := replace(plan, application=application))
+    assert bench.log(plan, "application.app") == "['truths/own.txt', 'data/own.rec']\n"

@@ -45,7 +45,7 @@ def test_numbers(text: str, value: float) -> None:
         (["--freq=0"], "argument --freq: '0', expected number in Hz, at least 1"),
         (["--id=1.5"], "argument --id: '1.5', expected integer, at least 0, at most 4294967295"),
         (["--id=-1"], "argument --id: '-1', expected integer, at least 0"),
-        (["--verbose=maybe"], "argument --verbose: 'maybe', expected boolean"),
+        (["--verbose=maybe"], "argument --verbose: 'maybe', expected true or false"),
         (["--role=other"], "argument --role: 'other', expected string, one of echo, judge, source, broken, library"),
     ],
 )

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from services.base.lockstep_clock import EPOCH
-from services.clock import exchange
+from services.clock import exchange, model
 from services.clock.exchange import ApplicationFails, ServiceSilent, TimeOver
 from services.clock.model import Stepper
 from tests.services.clock.toys import BOX, DRIVE, STEP, Filter, Mover, Toys
@@ -83,7 +83,7 @@ def test_the_test_time_is_limited(toys: Toys) -> None:
 
 @pytest.mark.thorough
 def test_a_service_that_does_not_answer_is_named(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(exchange, "SERVICE_PATIENCE", 0.3)
+    monkeypatch.setattr(model, "SERVICE_PATIENCE", 0.3)
     gone = threading.Event()
 
     class Hangs(Mover):

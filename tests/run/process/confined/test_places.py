@@ -51,6 +51,17 @@ def own(tmp_path: Path) -> Path:
     return folder
 
 
+def test_writes_stay_apart(own: Path) -> None:
+    def scene() -> object:
+        places = Places(str(own), USER)
+        owner = places.folder.stat().st_uid
+        (places.folder / "data").write_text("changed")
+        return [places.writable, owner]
+
+    assert within(scene, own) == [True, USER]
+    assert (own / "data").read_text() == "as it was"
+
+
 @pytest.mark.thorough
 def test_what_it_may_read_is_shown_as_its_own_where_the_kernel_can(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def owners() -> object:
