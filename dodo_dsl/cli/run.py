@@ -123,7 +123,7 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="run each test with 'vary' at N values of its ranges")  # fmt: skip
     parser.add_argument("--fail-fast", action="store_true", help="start no further test after one that did not pass")
     parser.add_argument("--retry-errors", type=positive, nargs="?", const=1, default=0, metavar="N",
-                        help="rerun a test that ended in error, up to N times (default without N: 1)")  # fmt: skip
+                        help="rerun a test in error, alone and last, up to N times (default without N: 1)")  # fmt: skip
     parser.add_argument("--compiled", type=Path, action="append", default=[], metavar="DIR/SLUG",
                         help="folder of a compiled test; repeatable")  # fmt: skip
     parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to inspect it")
