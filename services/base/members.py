@@ -42,7 +42,8 @@ class Producers(NamedTuple):
         """Why a test fails in which the application sent the message."""
         if self.services == (LINES,):
             return f"the application sent {self.message}, which it declares to print (x-dodo: lines)"
-        only = " and ".join(f"'{name}'" for name in self.services)
+        *others, last = [f"'{name}'" for name in self.services] or [""]
+        only = f"{', '.join(others)} and {last}" if others else last
         who = f"only {only} may send" if only else "no service of this test sends"
         return f"the application sent {self.message}, which {who}"
 

@@ -37,7 +37,7 @@ OWN = "take('/tmp')\nopen('/tmp/app.log', 'w').close()\nprint('own file', flush=
 
 def test_root_in_a_container_takes_no_place_of_folders_of_services(crate: Crate) -> None:
     """They are mounted in the ``/tmp`` that the application shares with them, and reaches from a service without it."""
-    judge = READY + AFTER_START + f"time.sleep(2)\nos.stat({str(crate.bench.folder)!r})\n" + PASS
+    judge = READY + AFTER_START + f"time.sleep(8)\nos.stat({str(crate.bench.folder)!r})\n" + PASS
     job = crate.job("takes", judge, TAKES + OWN + WAIT, user="0:0")
     application = job.plan.application
     (app,) = application.services
