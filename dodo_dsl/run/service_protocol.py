@@ -48,7 +48,8 @@ def read(service: str, is_evaluator: bool, message: bytes) -> Event | None:
             is_good = said.outcome == "passed"
             return VerdictEvent(service, is_good, said.reason, checks, said.evidence, said.silent)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError) as error:
-        reason = f"the verdict of evaluator '{service}' is malformed: {error}"
+        problem = "its outcome is neither passed nor failed" if "$.outcome" in str(error) else str(error)
+        reason = f"the verdict of evaluator '{service}' is malformed: {problem}"
         return Finding("error", reason, service) if is_verdict else None
     if isinstance(said, Late) and said.late > said.updates:
         return None

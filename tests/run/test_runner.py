@@ -111,6 +111,15 @@ def logged(scene: Scene) -> Scene:
     return scene
 
 
+def test_the_report_of_an_error_stays_where_no_turn_to_try_again_comes(logged: Scene) -> None:
+    logged.capacity, logged.policy = 1, {"fail_fast": True, "retries": 1}
+    make = logged.backends.make
+    logged.backends.make = lambda tested, attempt: make(tested, attempt + (tested.slug == "b"))
+    outcomes = logged.run(*plans("ab"))
+    assert [(outcome.outcome, outcome.notes) for outcome in outcomes] == [("error", ()), ("failed", ())]
+    assert (logged.folder / "report" / "a" / "logs" / "log").read_text() == "attempt 1"
+
+
 def test_an_error_is_retried_and_both_attempts_are_kept(logged: Scene) -> None:
     logged.policy = {"retries": 2}
     (outcome,) = logged.run(plan("a"))

@@ -107,6 +107,7 @@ MALFORMED = {
 def test_other_verdicts_are_malformed(case: str) -> None:
     found = read("track", True, MALFORMED[case])
     assert isinstance(found, Finding) and 0 < len(found.reason) < 250
+    assert ("its outcome is neither passed nor failed" in found.reason) == (case == "outcome")
     assert read("camera", False, MALFORMED[case]) is None
 
 
